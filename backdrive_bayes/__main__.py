@@ -1,0 +1,3 @@
+from backdrive_bayes.commands.main import main
+
+raise SystemExit(main())
