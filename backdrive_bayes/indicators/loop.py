@@ -1,0 +1,76 @@
+"""Settled loops of posterior draws: model, discrepancy and module parts on a torque grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backdrive_bayes.inference.discrepancy import Discrepancy, amplitude_nm, settled_path
+from backdrive_bayes.inference.problem import Problem
+
+POINTS = 161
+CHUNK = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Loops:
+    """Settled loops: ``torque_nm`` (points,) rising from -T to +T; ``rising`` and ``falling`` angle [rad] (draws, points)."""
+
+    torque_nm: np.ndarray
+    rising: np.ndarray
+    falling: np.ndarray
+
+    @property
+    def width(self) -> np.ndarray:
+        """w(τ) = θ₋ − θ₊ [rad], shape (draws, points)."""
+        return self.falling - self.rising
+
+    def __add__(self, other: Loops) -> Loops:
+        return Loops(self.torque_nm, self.rising + other.rising, self.falling + other.falling)
+
+
+def torque_grid(amplitude: float, exact=()) -> np.ndarray:
+    """Odd-symmetric torques from -T to +T, dense around zero, that hold zero and ±``exact`` [N·m]."""
+    half = amplitude * np.sinh(np.linspace(0, 4, POINTS // 2 + 1)) / np.sinh(4)
+    extra = [abs(t) for t in exact if 0 < abs(t) < amplitude]
+    half = np.unique(np.concatenate([half, extra]))
+    return np.concatenate([-half[:0:-1], half])
+
+
+def model_loops(problem: Problem, z, record: int, torque) -> Loops:
+    """The model's settled loops on ``torque`` (points,) for draws ``z`` (draws, dimension)."""
+    path = settled_path(torque)
+    return _cut(torque, _in_chunks(lambda v: problem.model.angle(v, path), problem, z, record))
+
+
+def module_loops(problem: Problem, z, record: int, torque) -> dict[str, Loops]:
+    """The loops of each module alone, by its name; they add up to :func:`model_loops`."""
+    path = settled_path(torque)
+    pieces: dict[str, list] = {}
+    for a in range(0, len(z), CHUNK):
+        for name, angle in problem.model.parts(problem.values(z[a : a + CHUNK], record), path).items():
+            pieces.setdefault(name, []).append(np.broadcast_to(angle, (len(z[a : a + CHUNK]), path.torque_nm.size)))
+    return {name: _cut(torque, np.concatenate(angle)) for name, angle in pieces.items()}
+
+
+def discrepancy_loops(problem: Problem, discrepancy: Discrepancy, weights, record: int, torque) -> Loops:
+    """The discrepancy on the same loops for coefficients ``weights`` (draws, terms)."""
+    basis = discrepancy.basis_on(problem, record, settled_path(torque))
+    return _cut(torque, weights @ basis.T)
+
+
+def record_amplitude_nm(problem: Problem, record: int) -> float:
+    """Amplitude T of a record [N·m]."""
+    return amplitude_nm(problem, record)
+
+
+def _in_chunks(function, problem, z, record):
+    return np.concatenate([function(problem.values(z[a : a + CHUNK], record)) for a in range(0, len(z), CHUNK)])
+
+
+def _cut(torque, angle):
+    """Loops out of angles along ``settled_path``: …, +T → −T → +T with both tips in the falling branch."""
+    n = torque.size
+    loop = angle[..., -(2 * n - 1) :]
+    return Loops(torque, loop[..., n - 1 :], loop[..., :n][..., ::-1])

@@ -1,0 +1,182 @@
+"""From a unit to a posterior: reduce, find the mode, learn noise and discrepancy, sample until converged."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backdrive_bayes.inference.diagnostics import Convergence, Outcome, diagnose_draws
+from backdrive_bayes.inference.discrepancy import Discrepancy, learn_discrepancy
+from backdrive_bayes.inference.noise_refinement import refine_noise
+from backdrive_bayes.inference.optimum import Optimum, find_optimum, screen_starts
+from backdrive_bayes.inference.problem import Problem, RecordData
+from backdrive_bayes.inference.sampling import Ensembles, Settings, run_ensembles, warm_up
+from backdrive_bayes.model.parameter import Scale
+from backdrive_bayes.model.reducer import ReducerModel
+from backdrive_bayes.model.registry import BASELINE, members_named
+from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise
+from backdrive_bayes.records.record import Unit
+from backdrive_bayes.records.reduction import reduce_record
+
+BETTER_MODE = 5.0
+"""Log posterior by which warm-up must beat the mode it started from for the fit to start again from there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Draws of one unit's parameters with all that is needed to turn them into loops.
+
+    ``z`` (ensembles, draws, dimension) are coordinates of ``problem``; ``discrepancy_weights`` (ensembles, draws, terms)
+    belong to the same draws.
+    """
+
+    unit: Unit
+    problem: Problem
+    discrepancy: Discrepancy
+    ensembles: Ensembles
+    discrepancy_weights: np.ndarray
+    convergence: Convergence
+    seed: int
+
+    @property
+    def z(self) -> np.ndarray:
+        """All draws as one list, shape (draws, dimension)."""
+        return self.ensembles.z.reshape(-1, self.problem.dimension)
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Discrepancy coefficients of the same draws, shape (draws, terms)."""
+        return self.discrepancy_weights.reshape(self.z.shape[0], -1)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every parameter and indicator passed the diagnostics."""
+        return self.convergence.outcome is Outcome.CONVERGED
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A problem ready to sample: mode, Laplace covariance and discrepancy."""
+
+    problem: Problem
+    optimum: Optimum
+    discrepancy: Discrepancy
+
+
+Quantities = Callable[[Problem, Discrepancy, np.ndarray, np.ndarray], dict[str, np.ndarray]]
+
+
+def angle_scale_rad(unit: Unit) -> float:
+    """Half the widest angle range of any record [rad], the scale of the priors."""
+    return 0.5 * max(float(np.ptp(r.angle_rad)) for r in unit.records)
+
+
+def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, blocks_per_segment: int = 120) -> Prepared:
+    """Reduce the records, find the mode and learn noise and discrepancy; ``scale`` overrides the priors' scale."""
+    scale = scale or Scale(unit.rated_torque_nm, angle_scale_rad(unit))
+    model = ReducerModel(members_named(baseline), scale)
+    segments = [find_segments(r.time_s, r.torque_nm) for r in unit.records]
+    noise = estimate_common_noise(
+        [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, s) for r, s in zip(unit.records, segments, strict=True)]
+    )
+    blocks = [reduce_record(r, s, n, blocks_per_segment) for r, s, n in zip(unit.records, segments, noise, strict=True)]
+    problem = Problem(model, tuple(RecordData.prepare(b, n) for b, n in zip(blocks, noise, strict=True)))
+    optimum = find_optimum(problem, screen_starts(problem, rng))
+    return _refine(problem, optimum)
+
+
+def _refine(problem, optimum) -> Prepared:
+    """Noise told from discrepancy, torque noise through the slopes, then mode and discrepancy again."""
+    problem = replace(problem, misfit=0.0)
+    discrepancy = learn_discrepancy(problem, optimum)
+    angles = [problem.model.angle(problem.values(optimum.z, r), d.path) for r, d in enumerate(problem.records)]
+    slopes = [_slope(d.blocks, angle) for d, angle in zip(problem.records, angles, strict=True)]
+    noise = refine_noise(problem, optimum.z, discrepancy, slopes)
+    records = tuple(
+        RecordData.prepare(d.blocks, n, s, d.path) for d, n, s in zip(problem.records, noise, slopes, strict=True)
+    )
+    problem = replace(problem, records=records)
+    optimum = find_optimum(problem, [optimum.z])
+    discrepancy = learn_discrepancy(problem, optimum)
+    problem = replace(problem, misfit=discrepancy.misfit)
+    return Prepared(problem, find_optimum(problem, [optimum.z]), discrepancy)
+
+
+def _slope(blocks, angle):
+    """dθ/dτ [rad/(N·m)] of the model at the blocks, taken over neighbours on the same leg."""
+    rise = np.gradient(angle)
+    run = np.abs(np.gradient(blocks.torque_nm))
+    typical = np.median(run) + 1e-300
+    return np.abs(rise) / np.maximum(run, 0.02 * typical)
+
+
+def fit(
+    unit: Unit,
+    *,
+    baseline=BASELINE,
+    seed: int = 0,
+    settings: Settings | None = None,
+    quantities: Quantities | None = None,
+    scale: Scale | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Posterior:
+    """Posterior of one unit.
+
+    ``quantities`` names further quantities of the draws (indicators) that must converge too. Sampling stops when every
+    parameter and quantity has converged or the settings' budget is spent; the outcome says which.
+    """
+    settings = settings or Settings()
+    began = time.perf_counter()
+    rng = np.random.default_rng(seed)
+    progress("reducing the records and finding the posterior mode")
+    prepared = prepare(unit, rng, baseline, scale)
+    progress("warming up the ensembles")
+    for _ in range(3):
+        problem, optimum = prepared.problem, prepared.optimum
+        proposal, share, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, settings)
+        if problem.log_posterior(best)[0] < optimum.log_posterior + BETTER_MODE:
+            break
+        prepared = _refine(problem, find_optimum(problem, [best]))
+    problem, discrepancy = prepared.problem, prepared.discrepancy
+    state: dict = {}
+
+    def enough(drawn: Ensembles) -> bool:
+        state["weights"] = _draw_weights(discrepancy, drawn, seed)
+        names, values = _named_draws(problem, discrepancy, drawn, state["weights"], quantities)
+        state["convergence"] = diagnose_draws(names, values, drawn.halves, time.perf_counter() - began)
+        done = state["convergence"].outcome is Outcome.CONVERGED
+        progress(_line(drawn, state["convergence"]))
+        return done
+
+    drawn = run_ensembles(
+        problem.log_posterior, proposal, share, rng, settings, enough, began + settings.max_seconds, time.perf_counter
+    )
+    return Posterior(unit, problem, discrepancy, drawn, state["weights"], state["convergence"], seed)
+
+
+def _draw_weights(discrepancy, drawn, seed):
+    ensembles, draws = drawn.z.shape[:2]
+    rng = np.random.default_rng([seed, 1])
+    return discrepancy.draw(rng, ensembles * draws).reshape(ensembles, draws, -1)
+
+
+def _named_draws(problem, discrepancy, drawn, weights, quantities):
+    names, values = list(problem.labels), [drawn.z]
+    if quantities is not None:
+        flat = drawn.z.reshape(-1, problem.dimension)
+        more = quantities(problem, discrepancy, flat, weights.reshape(flat.shape[0], -1))
+        names += list(more)
+        values += [v.reshape(*drawn.z.shape[:2], 1) for v in more.values()]
+    return names, np.concatenate(values, axis=-1)
+
+
+def _line(drawn, convergence):
+    worst = np.nanmin(np.minimum(convergence.bulk_ess, convergence.tail_ess))
+    return (
+        f"step {drawn.steps}: R-hat at most {np.nanmax(convergence.rhat):.4f}, ESS at least {worst:.0f} "
+        f"({convergence.worst}), acceptance {drawn.acceptance:.2f}"
+    )

@@ -1,0 +1,103 @@
+"""Friction: rate-independent with memory, a constant part and a part proportional to the load."""
+
+from __future__ import annotations
+
+import weakref
+
+import numpy as np
+from scipy.special import ndtr
+
+from backdrive_bayes.model.member import Stage
+from backdrive_bayes.model.parameter import LogNormal, Parameter, Uniform
+from backdrive_bayes.model.path import TorquePath
+from backdrive_bayes.model.play import play
+
+MESH = "weakly informative; losses of a few per cent a mesh and no-load torques in catalogues"
+LOAD_RATIOS = np.array([0.0, 0.015, 0.04, 0.08, 0.15, 0.3, 0.55, 0.9])
+CONSTANT_SHARES = np.r_[0.0, np.geomspace(0.002, 1.6, 12)]
+
+
+class Friction:
+    """Torque that reaches the elastic parts: a distribution of play operators (Prandtl-Ishlinskii).
+
+    An element holds until the torque has moved by r + m|τ| away from it. r and m are independent and log-normal with
+    means ``friction_torque`` and ``friction_ratio`` and the common log-sd ``friction_spread``, carried by mean-preserving
+    hat weights on a fixed grid; ``free_share`` of the torque passes without friction. On saturated branches of a linear
+    elastic unit this is the constant ∓d₀ of eq. (20), reconstructed, plus a part that grows with the load.
+    """
+
+    name = "friction"
+    stage = Stage.TRANSMISSION
+    source = "play operators for eq. (19)-(20), reconstructed; doi:10.1177/00202940261442382"
+    parameters = (
+        Parameter("friction_torque", "N·m", "torque", LogNormal(0.03, 1.0), 0.0, MESH),
+        Parameter("friction_ratio", "1", "none", LogNormal(0.05, 1.0), 0.0, MESH),
+        Parameter("friction_spread", "1", "none", LogNormal(0.5, 0.5), None, "between one threshold and decades"),
+        Parameter("free_share", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
+        Parameter("initial_friction_state", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
+    )
+
+    def respond(self, values, drive):
+        """Transmitted torque [N·m] of shape (…, samples)."""
+        bank = _bank(drive.path, drive.rated_torque_nm)
+        spread, start = values["friction_spread"], values["initial_friction_state"]
+        constant = hat_weights(CONSTANT_SHARES, values["friction_torque"] / drive.rated_torque_nm, spread)
+        load = hat_weights(LOAD_RATIOS, values["friction_ratio"], spread)
+        weights = (constant[..., :, None] * load[..., None, :]).reshape(*constant.shape[:-1], -1)
+        free = values["free_share"]
+        weights *= 1 - free
+        # The first element of the bank has no threshold: it passes the torque as it is.
+        weights[..., :1] += free
+        passed = np.matmul(weights, bank.neutral)
+        past = np.concatenate([weights * np.maximum(start, 0), weights * np.maximum(-start, 0)], axis=-1)
+        passed[..., : bank.past.shape[-1]] += np.matmul(past, bank.past)
+        return passed
+
+
+def hat_weights(nodes, mean, spread):
+    """Mean-preserving weights on ``nodes`` of a log-normal variable of given mean and log-sd.
+
+    ``nodes`` has shape (nodes,) and begins at 0; ``mean`` and ``spread`` have shape (…, 1). Returns shape (…, nodes), sums
+    to 1. Each weight is the integral of a hat function over the density; mass beyond the last node goes to it.
+    """
+    with np.errstate(divide="ignore"):
+        z = (np.log(nodes) - np.log(mean)) / spread
+    mass, moment = ndtr(z + 0.5 * spread), mean * ndtr(z - 0.5 * spread)
+    gap = np.diff(nodes)
+    d_mass, d_moment = np.diff(mass), np.diff(moment)
+    rise = (d_moment - nodes[:-1] * d_mass) / gap
+    weights = np.zeros_like(mass)
+    weights[..., 1:] += rise
+    weights[..., :-1] += d_mass - rise
+    weights[..., -1] += 1 - mass[..., -1]
+    return weights
+
+
+class _Bank:
+    """Play operators of all grid thresholds along one path, for three past states.
+
+    ``neutral`` (elements, samples) starts from rest. ``past`` (2 · elements, early samples) is the change when every element
+    starts at the upper end of its band (first half) or at the lower end, kept for the samples that remember it.
+    """
+
+    def __init__(self, path: TorquePath, rated_torque_nm: float):
+        constant = np.repeat(CONSTANT_SHARES * rated_torque_nm, LOAD_RATIOS.size)[:, None]
+        ratio = np.tile(LOAD_RATIOS, CONSTANT_SHARES.size)[:, None]
+
+        def lower(torque):
+            return torque - constant - ratio * np.abs(torque)
+
+        self.neutral = play(path, lower, np.zeros_like(constant))
+        past = np.concatenate([play(path, lower, np.full_like(constant, end)) - self.neutral for end in (np.inf, -np.inf)])
+        remembered = np.flatnonzero(np.any(past != 0, axis=0))
+        self.past = past[:, : int(remembered[-1]) + 1 if remembered.size else 0].copy()
+
+
+_banks: weakref.WeakKeyDictionary[TorquePath, dict[float, _Bank]] = weakref.WeakKeyDictionary()
+
+
+def _bank(path: TorquePath, rated_torque_nm: float) -> _Bank:
+    banks = _banks.setdefault(path, {})
+    if rated_torque_nm not in banks:
+        banks[rated_torque_nm] = _Bank(path, rated_torque_nm)
+    return banks[rated_torque_nm]

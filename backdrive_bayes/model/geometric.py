@@ -1,0 +1,47 @@
+"""Geometric error: a clearance crossed when the torque overcomes a drag torque, engaged gradually."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.model.member import Stage
+from backdrive_bayes.model.parameter import LogNormal, Parameter, Uniform
+from backdrive_bayes.model.play import play
+
+CATALOGUE = "weakly informative; clearance, drag and engagement of small planetary stages in catalogues"
+
+
+class Geometric:
+    """Play-like operator whose boundaries are the engagement curves of the two flanks.
+
+    The rising boundary is (c/2)[(1-e) tanh((τ-τ_d)/s) + e tanh((τ+τ_e)/s)], the falling one its mirror image. With e = 0 and
+    a saturated loop these are the branches A tanh(Bτ ∓ D) of eq. (20), reconstructed, with A = c/2, B = 1/s,
+    D = τ_d/s. The share e of the clearance springs back already when the torque has fallen to τ_e.
+    """
+
+    name = "geometric"
+    stage = Stage.COMPLIANCE
+    source = "eq. (19)-(20), reconstructed; doi:10.1177/00202940261442382"
+    parameters = (
+        Parameter("clearance", "rad", "angle", LogNormal(0.3, 1.5), 0.0, CATALOGUE),
+        Parameter("drag_torque", "N·m", "torque", LogNormal(0.03, 1.0), None, CATALOGUE),
+        Parameter("engagement_torque", "N·m", "torque", LogNormal(0.01, 1.0), None, CATALOGUE),
+        Parameter("release_share", "1", "none", Uniform(0.0, 0.5), None, "no preference"),
+        Parameter("release_torque", "N·m", "torque", LogNormal(0.02, 1.0), None, CATALOGUE),
+        Parameter("initial_gap_position", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
+    )
+
+    def respond(self, values, drive):
+        """Angle [rad] of shape (…, samples)."""
+        drag, width = values["drag_torque"], values["engagement_torque"]
+        share, release = values["release_share"], values["release_torque"]
+        release = drag * release / (drag + release)
+
+        def rising(torque):
+            engaged = np.tanh((torque - drag) / width)
+            engaged += share * (np.tanh((torque + release) / width) - engaged)
+            return engaged
+
+        gap = play(drive.path, rising, values["initial_gap_position"])
+        gap *= 0.5 * values["clearance"]
+        return gap

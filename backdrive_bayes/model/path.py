@@ -1,0 +1,68 @@
+"""A torque history as the reducer sees it: monotone legs between turning points."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """One monotone stretch: samples [start, stop), direction +1 or -1, torque at its far end [N·m]."""
+
+    start: int
+    stop: int
+    direction: int
+    end_torque_nm: float
+
+
+@dataclass(frozen=True, eq=False)
+class TorquePath:
+    """A torque history: ``torque_nm`` and ``time_s`` of shape (samples,), the torque it starts from, and its legs.
+
+    The legs are contiguous, cover all samples and alternate in direction; inside a leg the samples lie between the
+    turning torques at its two ends. Turning points need not be samples.
+    """
+
+    torque_nm: np.ndarray
+    time_s: np.ndarray
+    start_torque_nm: float
+    legs: tuple[Leg, ...]
+
+    @functools.cached_property
+    def direction(self) -> np.ndarray:
+        """Direction of the torque at each sample, ±1.0, shape (samples,)."""
+        return np.concatenate([np.full(leg.stop - leg.start, float(leg.direction)) for leg in self.legs])
+
+    @classmethod
+    def from_samples(cls, torque_nm, time_s=None) -> TorquePath:
+        """A path through noise-free torque samples of shape (samples,), turning at their local extremes."""
+        torque = np.asarray(torque_nm, float)
+        time = np.arange(torque.size, dtype=float) if time_s is None else np.asarray(time_s, float)
+        step = np.sign(np.diff(torque))
+        moving = np.flatnonzero(step)
+        if moving.size == 0:
+            return cls(torque, time, float(torque[0]), (Leg(0, torque.size, 1, float(torque[-1])),))
+        flips = np.flatnonzero(np.diff(step[moving])) + 1
+        turns = moving[flips]
+        bounds = np.r_[0, turns + 1, torque.size]
+        signs = step[moving[np.r_[0, flips]]]
+        ends = np.r_[torque[turns], torque[-1]]
+        legs = tuple(
+            Leg(int(a), int(b), int(s), float(e))
+            for a, b, s, e in zip(bounds[:-1], bounds[1:], signs, ends, strict=True)
+        )
+        return cls(torque, time, float(torque[0]), legs)
+
+    @classmethod
+    def from_turning_points(cls, turning_nm, points_per_leg: int = 200, rate_nm_per_s: float = 1.0) -> TorquePath:
+        """A noise-free path through the given turning torques, ``points_per_leg`` evenly spaced samples a leg."""
+        turning = np.asarray(turning_nm, float)
+        torque = [turning[:1]]
+        for a, b in zip(turning[:-1], turning[1:], strict=True):
+            torque.append(np.linspace(a, b, points_per_leg + 1)[1:])
+        torque = np.concatenate(torque)
+        time = np.r_[0.0, np.cumsum(np.abs(np.diff(torque)))] / rate_nm_per_s
+        return cls.from_samples(torque, time)

@@ -1,0 +1,163 @@
+"""Noise of the two channels: white and correlated angle noise, white torque noise, each with its uncertainty.
+
+The angle noise is a stationary Ornstein-Uhlenbeck process (variance, correlation time) plus white noise. It is estimated by
+the Whittle likelihood (Whittle 1953) on periodograms of short windows whose trend has been taken out; the median over the
+windows at each frequency keeps cliffs and jumps of the loop from passing as noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+PRIOR_CORRELATION_TIME_S = 0.03
+PRIOR_LOG_SD = 0.8
+WINDOWS_PER_SEGMENT = 16
+TREND_DEGREE = 3
+
+
+@dataclass(frozen=True)
+class NoiseEstimate:
+    """Standard deviations of the noise [rad, N·m], the correlation time [s], and their standard errors.
+
+    ``scale_dof`` is the weight of the estimate in chi-square degrees of freedom: the variance of block means is known to a
+    relative standard error sqrt(2 / scale_dof).
+    """
+
+    white_rad: float
+    correlated_rad: float
+    correlation_time_s: float
+    torque_nm: float
+    white_rad_sd: float
+    correlated_rad_sd: float
+    correlation_time_s_sd: float
+    torque_nm_sd: float
+    scale_dof: float
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelRecord:
+    """What the noise of one record is estimated from: arrays of shape (samples,) and its segments."""
+
+    time_s: np.ndarray
+    torque_nm: np.ndarray
+    angle_rad: np.ndarray
+    segments: tuple
+
+
+def estimate_noise(time_s, torque_nm, angle_rad, segments) -> NoiseEstimate:
+    """Noise of one record; arrays of shape (samples,), segments as from ``find_segments``."""
+    return estimate_common_noise([ChannelRecord(time_s, torque_nm, angle_rad, segments)])[0]
+
+
+def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
+    """Noise of the records of one bench: common angle noise, torque noise of each record."""
+    spectra = [_median_periodogram(r) for r in records]
+    theta, covariance = _fit_spectra(spectra)
+    sd = np.minimum(np.sqrt(np.diag(covariance)), 3.0)
+    correlated, white, correlation = (float(v) for v in np.exp(theta))
+    gradient = _block_gradient(correlated, white, correlation, spectra[0].step_s)
+    dof = float(np.clip(2.0 / max(gradient @ covariance @ gradient, 1e-9), 4.0, 1e5))
+    torque = [_torque_noise(np.asarray(r.torque_nm)) for r in records]
+    return tuple(
+        NoiseEstimate(
+            white_rad=white,
+            correlated_rad=correlated,
+            correlation_time_s=correlation,
+            torque_nm=level,
+            white_rad_sd=float(white * sd[1]),
+            correlated_rad_sd=float(correlated * sd[0]),
+            correlation_time_s_sd=float(correlation * sd[2]),
+            torque_nm_sd=error,
+            scale_dof=dof,
+        )
+        for level, error in torque
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """Median periodogram ``power`` at angular frequencies ``omega`` [rad/sample], and the weight of its ordinates."""
+
+    power: np.ndarray
+    omega: np.ndarray
+    weight: float
+    step_s: float
+
+    def cost(self, theta):
+        """Whittle's negative log likelihood of log(correlated), log(white), log(correlation time)."""
+        correlated, white, correlation = np.exp(theta)
+        phi = np.exp(-self.step_s / correlation)
+        model = correlated**2 * (1 - phi**2) / (1 - 2 * phi * np.cos(self.omega) + phi**2) + white**2
+        model += 1e-9 * self.power.mean() + 1e-40
+        return self.weight * np.sum(np.log(model) + self.power / model)
+
+
+def _median_periodogram(record: ChannelRecord) -> _Spectrum:
+    longest = max(s.stop - s.start for s in record.segments)
+    length = int(np.clip(longest // WINDOWS_PER_SEGMENT, min(32, longest), 2048))
+    starts = np.concatenate([np.arange(s.start, s.stop - length + 1, length) for s in record.segments])
+    windows = record.angle_rad[starts.astype(int)[:, None] + np.arange(length)]
+    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, length), TREND_DEGREE + 1))[0]
+    windows = windows - (windows @ basis) @ basis.T
+    taper = np.hanning(length + 2)[1:-1]
+    taper = taper / np.sqrt(np.mean(taper**2))
+    power = np.abs(np.fft.rfft(windows * taper, axis=1)) ** 2 / length
+    # The trend takes the lowest frequencies with it, the last one has another distribution.
+    keep = slice(TREND_DEGREE + 1, (length - 1) // 2)
+    # A Hann taper halves the independent ordinates, the median over windows has the efficiency ln(2)² of their mean.
+    weight = len(starts) * 0.5 * np.log(2.0) ** 2
+    omega = 2 * np.pi * np.fft.rfftfreq(length)[keep]
+    return _Spectrum(np.median(power[:, keep], axis=0) / np.log(2.0), omega, weight, float(np.median(np.diff(record.time_s))))
+
+
+def _fit_spectra(spectra):
+    """Log correlated and white standard deviations and log correlation time with their covariance."""
+    low = np.median([np.log(s.power[0] + 1e-40) for s in spectra])
+    high = np.median([np.log(np.median(s.power[3 * s.power.size // 4 :]) + 1e-40) for s in spectra])
+    centre = np.array([0.5 * low, 0.5 * high, np.log(PRIOR_CORRELATION_TIME_S)])
+
+    def cost(theta):
+        return sum(s.cost(theta) for s in spectra) + 0.5 * np.sum(((theta - centre) / [4.0, 4.0, PRIOR_LOG_SD]) ** 2)
+
+    floor = centre - [12, 12, 0]
+    floor[2] = np.log(min(s.step_s for s in spectra))
+    bounds = list(zip(floor, centre + [12, 12, 6], strict=True))
+    shifts = ((0.0, 0.0), (-1.5, -1.0), (-1.0, 1.0))
+    starts = [np.clip(centre + [a, 0, b], floor, centre + 6) for a, b in shifts]
+    best = min((minimize(cost, x, method="L-BFGS-B", bounds=bounds) for x in starts), key=lambda r: r.fun)
+    return best.x, np.linalg.pinv(_hessian(cost, best.x), hermitian=True)
+
+
+def _hessian(function, x, h=1e-2):
+    n = len(x)
+    unit = np.eye(n) * h
+    value = np.empty((n, n))
+    for i in range(n):
+        for j in range(i, n):
+            a = function(x + unit[i] + unit[j]) - function(x + unit[i] - unit[j])
+            b = function(x - unit[i] + unit[j]) - function(x - unit[i] - unit[j])
+            value[i, j] = value[j, i] = (a - b) / (4 * h * h)
+    w, v = np.linalg.eigh(value)
+    return (v * np.maximum(w, 0.1)) @ v.T
+
+
+def _block_gradient(correlated, white, correlation, step):
+    """Derivative of the log variance of a block mean (two correlation times long) by the three log parameters."""
+    span = max(2 * correlation, step)
+    ratio = span / correlation
+    slow = correlated**2 * 2 * (ratio - 1 + np.exp(-ratio)) / ratio**2
+    fast = white**2 * step / span
+    total = slow + fast
+    return np.array([2 * slow / total, 2 * fast / total, slow / total])
+
+
+def _torque_noise(torque):
+    """White torque noise [N·m] and its standard error, from second differences (blind to ramps)."""
+    second = np.diff(torque, 2)
+    if second.size < 8:
+        return 0.0, 0.0
+    sd = float(np.sqrt(np.mean(second**2) / 6.0))
+    return sd, sd / float(np.sqrt(second.size))

@@ -1,0 +1,185 @@
+"""Turning points of a noisy torque history: found on a smoothed copy, then located on the raw samples."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter, uniform_filter1d
+
+SHARE = 0.05  # a reversal smaller than this share of the peak-to-peak torque is ripple
+_MAIN_SHARE = 0.35  # reversals of this share set the length of a typical segment
+_NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the smoothed noise is noise
+_BLOCKS_PER_SEGMENT = 64
+_MEDIAN_BLOCKS = 9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
+
+
+def torque_noise(torque_nm: np.ndarray) -> float:
+    """Robust standard deviation of the sample-to-sample torque noise, in N·m."""
+    if len(torque_nm) < 3:
+        return 0.0
+    # second differences: the ramp itself drops out
+    return float(1.4826 * np.median(np.abs(np.diff(torque_nm, 2))) / np.sqrt(6.0))
+
+
+def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
+    """Indices of the torque's reversals, accurate to some hundredth of a segment; empty for constant or monotone torque.
+
+    Two passes: large reversals tell how long a segment is, then blocks of a fixed share of that length are searched
+    for all reversals, so that surges of the drive (short against the ramp, often as large as it) do not count.
+    """
+    if len(torque_nm) < 3:
+        return []
+    smooth, window = _smoothed(torque_nm)
+    span, noise = float(np.ptp(smooth)), torque_noise(torque_nm)
+    if not span > 4.0 * noise / np.sqrt(window):
+        return []
+    block = max(1, _segment_length(smooth, span) // _BLOCKS_PER_SEGMENT)
+    blocks = median_filter(_block_means(torque_nm, block), _MEDIAN_BLOCKS if block > 1 else 5, mode="nearest")
+    threshold = max(SHARE * float(np.ptp(blocks)), _NOISE_MULTIPLE * noise / np.sqrt(block))
+    return [k * block + block // 2 for k in _zigzag(blocks.tolist(), threshold)]
+
+
+def refine_turning_point(time_s: np.ndarray, torque_nm: np.ndarray, left: int, turn: int, right: int) -> int:
+    """Locate a reversal near ``turn`` to a sample or two, between its neighbours ``left`` and ``right``.
+
+    Robust lines through both flanks are intersected; with a dwell between equal slopes that is its middle. Where the
+    lines do not meet at the top (a long plateau, curved flanks), the middle of the top is returned.
+    """
+    time, part, turn = time_s[left:right], torque_nm[left:right], turn - left
+    height = part if part[turn] >= 0.5 * (part[0] + part[-1]) else -part
+    turn = _highest(height, turn)
+    clean, noise = _levelled(height)
+    middle = left + _middle(clean, turn, noise)
+    start, stop = _flank(clean[: turn + 1], noise)
+    end, begin = (len(height) - edge for edge in _flank(clean[turn:][::-1], noise))
+    if min(stop - start, end - begin) < 3:
+        return middle
+    rising, falling = _line(time[start:stop], height[start:stop]), _line(time[begin:end], height[begin:end])
+    meeting = _intersection(rising, falling, time[turn])
+    if meeting is None or not time[stop - 1] <= meeting <= time[begin]:
+        return middle
+    if _value(rising, meeting) > np.percentile(height[stop - 1 : begin + 1], 90) + 0.1 * np.ptp(height):
+        return middle
+    index = int(np.searchsorted(time, meeting))
+    return left + (index if time[index] - meeting <= meeting - time[index - 1] else index - 1)
+
+
+def _smoothed(torque: np.ndarray) -> tuple[np.ndarray, int]:
+    clean = median_filter(torque, 5, mode="nearest")  # single wild samples are drop-outs, not reversals
+    span = float(np.ptp(clean))
+    noise = torque_noise(torque)
+    if span <= 0.0 or noise <= 0.0:
+        return clean, 1
+    # as long as the noise asks for, but never so long that a reversal of a short cycle is lost
+    window = int(np.clip((noise / (0.01 * span)) ** 2, 1, max(len(torque) // 60, 1)))
+    return uniform_filter1d(clean, window, mode="nearest"), window
+
+
+def _segment_length(smooth: np.ndarray, span: float) -> int:
+    """Length in samples of a typical segment: a tenth of the record lies in shorter ones."""
+    step = max(1, len(smooth) // 20_000)
+    turns = [step * k for k in _zigzag(smooth[::step].tolist(), _MAIN_SHARE * span)]
+    lengths = np.sort(np.diff([0, *turns, len(smooth)]))
+    return int(lengths[np.searchsorted(np.cumsum(lengths), 0.1 * len(smooth))])
+
+
+def _block_means(values: np.ndarray, block: int) -> np.ndarray:
+    count = max(len(values) // block, 1)
+    return values[: count * block].reshape(count, -1).mean(axis=1)
+
+
+def _zigzag(levels: list[float], threshold: float) -> list[int]:
+    """Indices of the extremes from which the signal comes back by at least ``threshold``."""
+    turns: list[int] = []
+    low = high = 0
+    direction = 0
+    for k, level in enumerate(levels):
+        if level > levels[high]:
+            high = k
+        if level < levels[low]:
+            low = k
+        if direction >= 0 and level <= levels[high] - threshold:
+            turns += [high] if direction else []
+            direction, low = -1, k
+        elif direction <= 0 and level >= levels[low] + threshold:
+            turns += [low] if direction else []
+            direction, high = 1, k
+        if direction > 0:
+            low = k
+        elif direction < 0:
+            high = k
+    return turns
+
+
+def _highest(height: np.ndarray, left: int, turn: int, right: int) -> int:
+    """Highest sample of a smoothed copy near ``turn``; blocks and medians may have moved it along a short flank."""
+    before, after = turn - left, right - turn
+    reach = min(before // 2, after // 2, max(before, after) // 25 + 4)
+    part = height[turn - reach : turn + reach + 1]
+    if len(part) < 9:
+        return turn
+    smooth = uniform_filter1d(median_filter(part, 5, mode="nearest"), max(len(part) // 16, 1), mode="nearest")
+    tops = np.flatnonzero(smooth == smooth.max())
+    return turn - reach + int(tops[len(tops) // 2])
+
+
+def _highest(height: np.ndarray, turn: int) -> int:
+    """Highest sample of a smoothed copy near ``turn``; blocks and medians may have moved it along a short flank."""
+    before, after = turn, len(height) - turn
+    reach = min(before // 2, after // 2, max(before, after) // 25 + 4)
+    part = height[turn - reach : turn + reach + 1]
+    if len(part) < 9:
+        return turn
+    smooth = uniform_filter1d(median_filter(part, 5, mode="nearest"), max(len(part) // 16, 1), mode="nearest")
+    tops = np.flatnonzero(smooth == smooth.max())
+    return turn - reach + int(tops[len(tops) // 2])
+
+
+def _levelled(height: np.ndarray) -> tuple[np.ndarray, float]:
+    """Copy of ``height`` smoothed so far that its levels can be told apart, and the noise left in it."""
+    noise, span = torque_noise(height), float(np.ptp(height))
+    window = int(np.clip((noise / (0.01 * span)) ** 2, 1, max(len(height) // 40, 1))) if span > 0.0 else 1
+    return uniform_filter1d(height, window, mode="nearest") if window > 1 else height, noise / np.sqrt(window)
+
+
+def _flank(height: np.ndarray, noise: float) -> tuple[int, int]:
+    """Range of a rising flank that is clear of both its ends; ``height`` ends at the top."""
+    if len(height) < 4:
+        return 0, len(height)
+    low, high = np.percentile(height, [2, 98]) + np.array([2.0, -2.0]) * noise
+    # counting samples below a level finds its crossing on a monotone flank, whatever the noise
+    start = int(np.count_nonzero(height < low + 0.3 * (high - low)))
+    stop = int(np.count_nonzero(height < high - max(0.06 * (high - low), 2.0 * noise)))
+    return start, max(stop, start)
+
+
+def _middle(height: np.ndarray, turn: int, noise: float) -> int:
+    """Middle of the samples at the top, between the crossings of one level on either side."""
+    before, after = height[: turn + 1], height[turn:]
+    top = min(np.percentile(before, 98), np.percentile(after, 98)) - 2.0 * noise
+    level = top - max(0.06 * min(np.ptp(before), np.ptp(after)), 2.0 * noise)
+    first, last = np.count_nonzero(before < level), len(height) - np.count_nonzero(after < level)
+    return max(1, int(first + last) // 2)
+
+
+def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
+    """Line (time origin, level there, slope) through the samples, outliers trimmed once."""
+    origin = float(x.mean())
+    shifted, keep = x - origin, np.ones(len(x), bool)
+    for _ in range(2):
+        slope, level = np.polyfit(shifted[keep], y[keep], 1)
+        residual = np.abs(y - level - slope * shifted)
+        keep = residual <= 4.0 * 1.4826 * np.median(residual) + 1e-12 * np.abs(y).max()
+        if np.count_nonzero(keep) < 3:
+            break
+    return origin, float(level), float(slope)
+
+
+def _value(line: tuple[float, float, float], time: float) -> float:
+    origin, level, slope = line
+    return level + slope * (time - origin)
+
+
+def _intersection(up, down, near: float) -> float | None:
+    if not (up[2] > 0.0 > down[2]):
+        return None
+    return near + (_value(down, near) - _value(up, near)) / (up[2] - down[2])
