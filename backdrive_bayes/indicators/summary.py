@@ -119,7 +119,8 @@ def _record_json(posterior, record, k, level):
         "loading_rate_Nm_per_s": loading_rate_nm_per_s(data),
         "amplitude_Nm": record_amplitude_nm(problem, record),
         "indicators": _core_json(bare, full, k * _rated(problem), level),
-        "mechanism": _mechanism_json(posterior, record, torque, full, level),
+        "loop": _loop_json(full, level),
+        **_mechanism_json(posterior, record, torque, full, level),
         "torque_energy": {
             "torque_Nm": energy_torque.tolist(),
             "median_J_per_Nm": median.tolist(),
@@ -152,16 +153,28 @@ def _core_json(bare, full, lost_motion_torque, level):
     return out
 
 
+def _loop_json(full, level):
+    bands = {}
+    for branch in ("rising", "falling"):
+        lo, median, hi = np.quantile(getattr(full, branch), [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
+        bands[f"{branch}_rad"] = {"median": median.tolist(), "lo": lo.tolist(), "hi": hi.tolist()}
+    return {"torque_Nm": full.torque_nm.tolist(), **bands}
+
+
 def _mechanism_json(posterior, record, torque, full, level):
-    """S_g and S_f: the areas that the geometric and the friction module enclose; the rest is the discrepancy's."""
+    """S_g and S_f, the areas that the geometric and friction modules enclose (the rest is the discrepancy's), and their loops."""
     modules = module_loops(posterior.problem, posterior.z, record, torque)
-    area = ind.loop_area_j(full)
-    out = {}
+    area, split, curves = ind.loop_area_j(full), {}, {}
+    for name, loops in modules.items():
+        curves[name] = {
+            "rising_rad": np.median(loops.rising, axis=0).tolist(),
+            "falling_rad": np.median(loops.falling, axis=0).tolist(),
+        }
     for name, key in (("geometric", "S_g"), ("friction", "S_f")):
         if name in modules:
             own = ind.loop_area_j(modules[name])
-            out[f"{key}_J"], out[f"{key}_over_S"] = interval(own, level), interval(own / area, level)
-    return out
+            split[f"{key}_J"], split[f"{key}_over_S"] = interval(own, level), interval(own / area, level)
+    return {"mechanism": split, "modules": curves}
 
 
 def _by_amplitude_json(posterior, record, level):

@@ -26,22 +26,29 @@ WALKERS_AT_ONCE = 32
 
 @dataclass(frozen=True, eq=False)
 class RecordData:
-    """One reduced record with its torque path and its whitener."""
+    """One reduced record with its torque path and whitener, and how its encoder offset follows from a residual.
+
+    ``offset_weight`` (blocks,) gives the generalised least-squares offset, ``offset_sd_rad`` its standard error.
+    """
 
     blocks: Blocks
     noise: NoiseEstimate
     path: TorquePath
     whitener: np.ndarray
+    offset_weight: np.ndarray
+    offset_sd_rad: float
 
     @classmethod
     def prepare(cls, blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0, path=None) -> RecordData:
         """Whiten with the block covariance; ``slope_rad_per_nm`` as in ``block_covariance``."""
         white = whitener(block_covariance(blocks, noise, slope_rad_per_nm))
         ones = white.sum(axis=1)
-        ones = ones / np.linalg.norm(ones)
+        norm = np.linalg.norm(ones)
+        ones = ones / norm
+        weight = ones @ white / norm
         # Taking the offset's direction out of the whitener marginalises the offset under a flat prior.
         white = white - np.outer(ones, ones @ white)
-        return cls(blocks, noise, path or path_of(blocks), white)
+        return cls(blocks, noise, path or path_of(blocks), white, weight, float(1 / norm))
 
 
 def path_of(blocks: Blocks) -> TorquePath:
@@ -165,15 +172,9 @@ class Problem:
         return value
 
     def offsets_rad(self, z) -> np.ndarray:
-        """Least-squares encoder offsets given z, shape (…, records) [rad]."""
+        """Generalised least-squares encoder offsets given z, shape (…, records) [rad]."""
         out = []
         for r, data in enumerate(self.records):
             raw = data.blocks.angle_rad - self.model.angle(self.values(z, r), data.path)
-            out.append(_offset(raw, data))
+            out.append(raw @ data.offset_weight)
         return np.stack(out, axis=-1)
-
-
-def _offset(raw, data):
-    # The whitener has lost the offset's direction, so weigh with the block lengths: the covariance is close to diagonal in them.
-    weight = (data.blocks.end_s - data.blocks.begin_s) / np.sum(data.blocks.end_s - data.blocks.begin_s)
-    return raw @ weight
