@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +40,16 @@ class Convergence:
         )
         return Outcome.CONVERGED if fine.all() else Outcome.NOT_CONVERGED
 
+    def joined(self, other: Convergence) -> Convergence:
+        """Both sets of quantities as one."""
+        return Convergence(
+            self.names + other.names,
+            np.concatenate([self.rhat, other.rhat]),
+            np.concatenate([self.bulk_ess, other.bulk_ess]),
+            np.concatenate([self.tail_ess, other.tail_ess]),
+            other.seconds,
+        )
+
     @property
     def worst(self) -> str:
         """Name of the quantity that mixes worst."""
@@ -59,32 +68,25 @@ class Convergence:
         }
 
 
-def diagnose_draws(names, draws, halves, seconds: float) -> Convergence:
-    """Diagnostics of ``draws`` (ensembles, draws, quantities) ordered walker by walker.
+def diagnose_draws(names, draws, step, seconds: float) -> Convergence:
+    """Diagnostics of ``draws`` (ensembles, draws, quantities) ordered walker by walker, drawn at ``step`` (ensembles, draws).
 
-    ``halves`` (ensembles, draws) marks the first and second half of the run; R-hat is taken over ensembles and halves.
+    Walker by walker, the autocorrelation is that of the walkers and ESS is honest; in the order of time, split R-hat
+    compares the ensembles and the halves of the run.
     """
-    split = _split_in_time(draws, halves)
+    order = np.argsort(step, axis=1, kind="stable")
+    in_time = np.take_along_axis(draws, order[..., None], axis=1)
     return Convergence(
         tuple(names),
-        _arviz("rhat", split),
+        _arviz("rhat", in_time),
         _arviz("ess", draws, method="bulk"),
-        _arviz("ess", draws, method="tail"),
+        _arviz("ess", draws, method="tail", prob=(0.05, 0.95)),
         seconds,
     )
 
 
-def _split_in_time(draws, halves):
-    parts = [chain[half == h] for chain, half in zip(draws, halves, strict=True) for h in (0, 1)]
-    shortest = min(len(p) for p in parts)
-    return np.stack([p[:shortest] for p in parts])
-
-
 def _arviz(function, draws, **options):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import arviz
-        import xarray
+    """One statistic of every quantity, shape (quantities,)."""
+    from arviz_stats.base import array_stats
 
-        data = xarray.Dataset({"q": (("chain", "draw", "quantity"), draws)})
-        return np.asarray(getattr(arviz, function)(data, **options)["q"], float)
+    return np.asarray(getattr(array_stats, function)(draws, chain_axis=0, draw_axis=1, **options), float)

@@ -137,7 +137,7 @@ def fit(
     progress("warming up the ensembles")
     for _ in range(3):
         problem, optimum = prepared.problem, prepared.optimum
-        proposal, share, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, settings)
+        proposal, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, settings)
         if problem.log_posterior(best)[0] < optimum.log_posterior + BETTER_MODE:
             break
         prepared = _refine(problem, find_optimum(problem, [best]))
@@ -146,14 +146,18 @@ def fit(
 
     def enough(drawn: Ensembles) -> bool:
         state["weights"] = _draw_weights(discrepancy, drawn, seed)
-        names, values = _named_draws(problem, discrepancy, drawn, state["weights"], quantities)
-        state["convergence"] = diagnose_draws(names, values, drawn.halves, time.perf_counter() - began)
-        done = state["convergence"].outcome is Outcome.CONVERGED
-        progress(_line(drawn, state["convergence"]))
-        return done
+        convergence = diagnose_draws(problem.labels, drawn.z, drawn.step, time.perf_counter() - began)
+        if convergence.outcome is Outcome.CONVERGED and quantities is not None:
+            names, values = _quantity_draws(problem, discrepancy, drawn, state["weights"], quantities)
+            more = diagnose_draws(names, values, drawn.step, time.perf_counter() - began)
+            convergence = convergence.joined(more)
+        state["convergence"] = convergence
+        progress(_line(drawn, convergence))
+        return convergence.outcome is Outcome.CONVERGED
 
+    deadline = began + settings.max_seconds
     drawn = run_ensembles(
-        problem.log_posterior, proposal, share, rng, settings, enough, began + settings.max_seconds, time.perf_counter
+        problem.log_posterior, proposal, rng, settings, enough, lambda: time.perf_counter() > deadline
     )
     return Posterior(unit, problem, discrepancy, drawn, state["weights"], state["convergence"], seed)
 
@@ -164,14 +168,10 @@ def _draw_weights(discrepancy, drawn, seed):
     return discrepancy.draw(rng, ensembles * draws).reshape(ensembles, draws, -1)
 
 
-def _named_draws(problem, discrepancy, drawn, weights, quantities):
-    names, values = list(problem.labels), [drawn.z]
-    if quantities is not None:
-        flat = drawn.z.reshape(-1, problem.dimension)
-        more = quantities(problem, discrepancy, flat, weights.reshape(flat.shape[0], -1))
-        names += list(more)
-        values += [v.reshape(*drawn.z.shape[:2], 1) for v in more.values()]
-    return names, np.concatenate(values, axis=-1)
+def _quantity_draws(problem, discrepancy, drawn, weights, quantities):
+    flat = drawn.z.reshape(-1, problem.dimension)
+    values = quantities(problem, discrepancy, flat, weights.reshape(flat.shape[0], -1))
+    return list(values), np.stack([v.reshape(drawn.z.shape[:2]) for v in values.values()], axis=-1)
 
 
 def _line(drawn, convergence):

@@ -1,67 +1,34 @@
 """Sampling with emcee: the only module that knows it.
 
 Several independent ensembles start from an adapted approximation of the posterior and move by a mixture of an independence
-proposal (Student-t) and differential evolution. R-hat and ESS are taken over ensembles, never over the walkers of one.
+proposal (a Student-t mixture) and differential evolution. R-hat and ESS are taken over ensembles, never over the walkers of one.
 """
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 
 import emcee
 import numpy as np
 from emcee.moves import DEMove, Move
-from scipy.special import gammaln
 
-DEGREES = 6.0
+from backdrive_bayes.inference.proposal import StudentMixture, effective_share, fit_mixture, importance, temper
 
-
-@dataclass(frozen=True, eq=False)
-class StudentT:
-    """Multivariate Student-t: ``mean`` (dimension,), lower-triangular ``factor`` of its scale matrix."""
-
-    mean: np.ndarray
-    factor: np.ndarray
-    degrees: float = DEGREES
-
-    @functools.cached_property
-    def _inverse(self):
-        return np.linalg.inv(self.factor)
-
-    @classmethod
-    def fit(cls, draws, weights, degrees=DEGREES) -> StudentT:
-        """Moments of weighted ``draws`` (n, dimension)."""
-        mean = weights @ draws
-        centred = draws - mean
-        covariance = (centred * weights[:, None]).T @ centred
-        ridge = 1e-10 * np.trace(covariance) / mean.size + 1e-14
-        return cls(mean, np.linalg.cholesky(covariance + ridge * np.eye(mean.size)), degrees)
-
-    def draw(self, rng, n: int) -> np.ndarray:
-        """Draws of shape (n, dimension)."""
-        normal = rng.standard_normal((n, self.mean.size))
-        stretch = np.sqrt(self.degrees / rng.chisquare(self.degrees, size=(n, 1)))
-        return self.mean + stretch * (normal @ self.factor.T)
-
-    def log_density(self, z) -> np.ndarray:
-        """Log density at ``z`` (n, dimension), shape (n,)."""
-        d, nu = self.mean.size, self.degrees
-        white = self._inverse @ (z - self.mean).T
-        constant = gammaln((nu + d) / 2) - gammaln(nu / 2) - 0.5 * d * np.log(nu * np.pi)
-        return constant - np.log(np.diag(self.factor)).sum() - 0.5 * (nu + d) * np.log1p((white**2).sum(axis=0) / nu)
+PARTS = (1, 4)
+WORTHWHILE = 1.3
+"""By how much a refitted proposal must be better for the draws made so far to be given up."""
 
 
 class IndependenceMove(Move):
     """Proposes every walker anew from a fixed density that does not look at the ensemble (Metropolised independence)."""
 
-    def __init__(self, proposal: StudentT):
+    def __init__(self, proposal: StudentMixture):
         self.proposal = proposal
 
     def propose(self, model, state):
         """One step for all walkers; emcee's interface."""
         walkers = state.coords.shape[0]
-        new = self.proposal.draw(model.random, walkers)
+        new = self.proposal.draw(_Generator(model.random), walkers)
         log_prob, blobs = model.compute_log_prob_fn(new)
         ratio = log_prob - state.log_prob + self.proposal.log_density(state.coords) - self.proposal.log_density(new)
         accepted = np.log(model.random.random_sample(walkers)) < ratio
@@ -69,18 +36,11 @@ class IndependenceMove(Move):
         return self.update(state, moved, accepted), accepted
 
 
-def importance(log_posterior, proposal: StudentT, rng, n: int):
-    """Draws (n, dimension), their log posterior (n,) and normalised importance weights (n,)."""
-    z = proposal.draw(rng, n)
-    value = log_posterior(z)
-    log_weight = value - proposal.log_density(z)
-    weight = np.exp(log_weight - log_weight.max())
-    return z, value, weight / weight.sum()
+class _Generator:
+    """emcee's legacy random state behind the few names of numpy's Generator that a proposal draws with."""
 
-
-def effective_share(weight) -> float:
-    """Effective share of importance draws, (Σw)² / (n Σw²)."""
-    return float(1 / np.sum(weight**2) / weight.size)
+    def __init__(self, random):
+        self.choice, self.chisquare, self.standard_normal = random.choice, random.chisquare, random.standard_normal
 
 
 @dataclass(frozen=True)
@@ -89,9 +49,9 @@ class Settings:
 
     ensembles: int = 4
     walkers: int = 64
-    warm_up_block: int = 100
-    warm_up_blocks: int = 12
     block: int = 60
+    warm_up_blocks: int = 10
+    refits: int = 8
     kept_per_ensemble: int = 1000
     max_seconds: float = 120.0
     good_share: float = 0.15
@@ -101,76 +61,109 @@ class Settings:
 class Ensembles:
     """What the independent ensembles drew: ``z`` (ensembles, draws, dimension), kept evenly in time and walker by walker.
 
-    ``halves`` (ensembles, draws) says whether a draw is from the first (0) or second half of the run.
+    ``step`` (ensembles, draws) is the step at which each was drawn.
     """
 
     z: np.ndarray
     log_posterior: np.ndarray
-    halves: np.ndarray
+    step: np.ndarray
     acceptance: float
     steps: int
-    proposal: StudentT
-    importance_share: float
+    proposal: StudentMixture
 
 
 def warm_up(log_posterior, mode, covariance, rng, settings: Settings):
-    """A Student-t fitted to the posterior by importance sampling where that works, else by differential evolution.
+    """A proposal fitted to the posterior: by importance sampling where that works, else by differential evolution.
 
-    Returns the proposal, its effective importance share and the best point seen.
+    Returns the proposal and the best point seen.
     """
-    proposal = StudentT(mode, np.linalg.cholesky(covariance))
+    proposal, share = _polish(log_posterior, StudentMixture.single(mode, covariance), rng)
     walkers = _walkers(settings, mode.size)
-    z, value, weight = importance(log_posterior, proposal, rng, 8 * walkers)
-    start = z[rng.choice(z.shape[0], walkers, replace=False, p=_temper(weight, walkers * 3 / z.shape[0]))]
-    share, best = effective_share(weight), z[np.argmax(value)]
+    state, best = _starts(log_posterior, proposal, rng, walkers)
     sampler = _sampler(walkers, mode.size, log_posterior, [(DEMove(), 0.9), (DEMove(gamma0=1.0), 0.1)], rng)
-    state = emcee.State(start, log_prob=log_posterior(start), random_state=sampler.random_state)
     history = []
     for _ in range(settings.warm_up_blocks):
         if share >= settings.good_share:
             break
         sampler.reset()
-        state = sampler.run_mcmc(state, settings.warm_up_block, skip_initial_state_check=True)
-        history.append(sampler.get_chain(thin=5, flat=True))
-        draws = np.concatenate(history[-max(1, len(history) // 2) :])
-        trial = StudentT.fit(draws, np.full(draws.shape[0], 1 / draws.shape[0]))
-        z, value, weight = importance(log_posterior, trial, rng, 4 * walkers)
-        proposal, share = trial, effective_share(weight)
+        state = sampler.run_mcmc(state, settings.block, skip_initial_state_check=True)
+        history.append(sampler.get_chain(thin=4, flat=True))
+        proposal, share = _refit(log_posterior, np.concatenate(history[len(history) // 2 :]), rng)
         best = state.coords[np.argmax(state.log_prob)]
-    return proposal, share, best
+    return proposal, best
 
 
-def run_ensembles(log_posterior, proposal: StudentT, share, rng, settings: Settings, enough, deadline_s, clock):
-    """Independent ensembles until ``enough(Ensembles)`` or the deadline; yields after every block of steps."""
-    dimension, walkers = proposal.mean.size, _walkers(settings, proposal.mean.size)
-    moves = [(IndependenceMove(proposal), 0.7), (DEMove(), 0.3)]
-    samplers, states = [], []
-    for _ in range(settings.ensembles):
-        z, _, weight = importance(log_posterior, proposal, rng, 8 * walkers)
-        start = z[rng.choice(z.shape[0], walkers, replace=False, p=_temper(weight, walkers * 3 / z.shape[0]))]
-        sampler = _sampler(walkers, dimension, log_posterior, moves, rng)
-        states.append(sampler.run_mcmc(start, settings.block // 2, skip_initial_state_check=True))
-        sampler.reset()
-        samplers.append(sampler)
+def _refit(log_posterior, draws, rng):
+    """The best mixture fitted to ``draws`` and its effective importance share."""
+    draws = draws[rng.permutation(draws.shape[0])[:2500]]
+    even = np.full(draws.shape[0], 1 / draws.shape[0])
+    tried = [_polish(log_posterior, fit_mixture(draws, even, rng, parts), rng, rounds=1) for parts in PARTS]
+    return max(tried, key=lambda pair: pair[1])
+
+
+def _polish(log_posterior, proposal, rng, rounds: int = 3, n: int = 1024):
+    """The best of ``proposal`` and its importance-weighted refits, with its effective share."""
+    best, best_share = proposal, -1.0
+    for k in range(rounds):
+        z, _, weight = importance(log_posterior, proposal, rng, n)
+        share = effective_share(weight)
+        if share > best_share:
+            best, best_share = proposal, share
+        if k + 1 < rounds:
+            proposal = fit_mixture(z, temper(weight, max(0.05, 5 * z.shape[1] / n)), rng, 1)
+    return best, best_share
+
+
+def _starts(log_posterior, proposal, rng, walkers):
+    """Over-dispersed starting points (walkers, dimension) and the best point seen."""
+    z, value, weight = importance(log_posterior, proposal, rng, 8 * walkers)
+    picked = rng.choice(z.shape[0], walkers, replace=False, p=temper(weight, 3 / 8))
+    return z[picked], z[np.argmax(value)]
+
+
+def run_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settings, enough, out_of_time) -> Ensembles:
+    """Independent ensembles until ``enough(Ensembles)`` or ``out_of_time()``.
+
+    While they have not converged, the proposal is refitted to what they drew; where that makes it clearly better, all is drawn
+    anew, so that adaptation never enters the draws that are kept.
+    """
+    walkers = _walkers(settings, proposal.mean.shape[1])
+    states = [_starts(log_posterior, proposal, rng, walkers)[0] for _ in range(settings.ensembles)]
+    refits_left, steps = settings.refits, settings.block
+    samplers, states = _begin(log_posterior, proposal, states, rng, settings)
     while True:
-        states = [
-            s.run_mcmc(x, settings.block, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)
-        ]
-        drawn = _collect(samplers, proposal, share, settings.kept_per_ensemble)
-        if enough(drawn) or clock() > deadline_s:
+        states = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)]
+        drawn = _collect(samplers, proposal, settings.kept_per_ensemble)
+        if enough(drawn) or out_of_time():
             return drawn
+        steps = max(steps, drawn.steps // 2)
+        if refits_left:
+            refits_left -= 1
+            better, share = _refit(log_posterior, np.concatenate([s.get_chain(flat=True) for s in samplers]), rng)
+            if share > WORTHWHILE * _polish(log_posterior, proposal, rng, rounds=1)[1]:
+                proposal = better
+                samplers, states = _begin(log_posterior, proposal, states, rng, settings)
 
 
-def _collect(samplers, proposal, share, kept):
+def _begin(log_posterior, proposal, states, rng, settings):
+    """Fresh samplers with their burn-in behind them."""
+    moves = [(IndependenceMove(proposal), 0.7), (DEMove(), 0.25), (DEMove(gamma0=1.0), 0.05)]
+    samplers = [_sampler(_walkers(settings, proposal.mean.shape[1]), proposal.mean.shape[1], log_posterior, moves, rng) for _ in states]
+    burnt = [s.run_mcmc(x, settings.block // 2, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)]
+    for sampler in samplers:
+        sampler.reset()
+    return samplers, burnt
+
+
+def _collect(samplers, proposal, kept):
     steps, walkers = samplers[0].iteration, samplers[0].nwalkers
     thin = max(1, int(np.ceil(steps * walkers / kept)))
-    picked = np.arange(steps - 1 - thin * ((steps - 1) // thin), steps, thin)
-    first = np.broadcast_to(picked < steps / 2, (walkers, picked.size)).ravel()
+    picked = np.arange((steps - 1) % thin, steps, thin)
     z = np.stack([s.get_chain()[picked].swapaxes(0, 1).reshape(-1, s.ndim) for s in samplers])
     value = np.stack([s.get_log_prob()[picked].T.ravel() for s in samplers])
-    halves = np.broadcast_to(np.where(first, 0, 1), value.shape)
+    step = np.broadcast_to(np.tile(picked, walkers), value.shape)
     acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
-    return Ensembles(z, value, halves, acceptance, steps, proposal, share)
+    return Ensembles(z, value, step, acceptance, steps, proposal)
 
 
 def _walkers(settings, dimension):
@@ -182,15 +175,3 @@ def _sampler(walkers, dimension, log_posterior, moves, rng):
     # Unseeded samplers of one process share their random state: each gets its own.
     sampler.random_state = np.random.RandomState(rng.integers(2**31)).get_state()
     return sampler
-
-
-def _temper(weight, share):
-    """Flatten weights until their effective share is at least ``share``."""
-    log_weight = np.log(np.maximum(weight, 1e-300))
-    power = 1.0
-    while True:
-        w = np.exp(power * (log_weight - log_weight.max()))
-        w /= w.sum()
-        if effective_share(w) >= min(share, 0.9) or power < 1e-3:
-            return w
-        power *= 0.8

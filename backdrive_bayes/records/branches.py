@@ -15,7 +15,7 @@ _FULL_SHARE = 0.3  # a reversal this large against the last, on both sides of ze
 
 @dataclass(frozen=True)
 class Segment:
-    """Samples [start, stop) between two turning points; ``direction`` is +1 where torque rises, -1 where it falls."""
+    """Samples [start, stop) between turning points; ``direction`` is +1 for rising torque, -1 for falling."""
 
     start: int
     stop: int
@@ -26,9 +26,9 @@ class Segment:
 class Branch:
     """Samples [start, stop) of a segment on one side of zero torque.
 
-    ``label`` is 'load+' (0 to +T), 'unload+' (+T to 0), 'load-' (0 to -T) or 'unload-' (-T to 0). ``cycle`` is 0 before
-    the first turning point (the first loading of a fresh record), then 1, 2, … from one full reversal of a kind to
-    the next of the same kind.
+    ``label`` is 'load+' (0 to +T), 'unload+' (+T to 0), 'load-' (0 to -T) or 'unload-' (-T to 0). ``cycle``
+    is 0 before the first turning point (the first loading of a fresh record), then 1, 2, … from one full
+    reversal of a kind to the next of the same kind.
     """
 
     start: int
@@ -40,8 +40,8 @@ class Branch:
 def find_segments(time_s: np.ndarray, torque_nm: np.ndarray) -> tuple[Segment, ...]:
     """Cut a record at its turning points; the segments are contiguous and cover all samples.
 
-    A reversal counts when it exceeds both a share of the peak-to-peak torque and the noise; a dwell or a saturated
-    plateau is cut in its middle. Constant torque gives one segment.
+    A reversal counts when it exceeds both a share of the peak-to-peak torque and the noise; a dwell or a
+    saturated plateau is cut in its middle. Constant torque gives one segment.
     """
     torque = np.asarray(torque_nm, float)
     time = np.asarray(time_s, float)
@@ -49,8 +49,10 @@ def find_segments(time_s: np.ndarray, torque_nm: np.ndarray) -> tuple[Segment, .
     for _ in range(2):  # the second pass has better neighbours to look between
         inner = {refine_turning_point(time, torque, *edges[k : k + 3]) for k in range(len(edges) - 2)}
         edges = [0, *sorted(edge for edge in inner if 0 < edge < len(torque)), len(torque)]
-    return tuple(Segment(start, stop, _direction(torque[start:stop]))
-                 for start, stop in zip(edges[:-1], edges[1:], strict=True))
+    return tuple(
+        Segment(start, stop, _direction(torque[start:stop]))
+        for start, stop in zip(edges[:-1], edges[1:], strict=True)
+    )
 
 
 def find_branches(

@@ -34,7 +34,7 @@ _SPELLED_ALIKE = str.maketrans({"µ": "u", "μ": "u", "′": "'", "’": "'", "�
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column's plain name with the unit it is written in; ``to_si`` multiplies a value into s, N·m or rad."""
+    """A column's plain name and its unit; ``to_si`` multiplies a value into s, N·m or rad."""
 
     name: str
     unit: str
@@ -44,14 +44,17 @@ class Quantity:
 def parse_quantity(spelling: str, kind: str, where: str) -> Quantity:
     """Read the name and unit of a ``kind`` ('time', 'torque' or 'angle') column from its spelling.
 
-    ``torque_mNm``, ``M [mN·m]`` and ``M (mNm)`` all work. Raises BadInput at ``where`` when the unit is missing or
-    does not belong to the kind.
+    ``torque_mNm``, ``M [mN·m]`` and ``M (mNm)`` all work. Raises BadInput at ``where`` when the unit is
+    missing or does not belong to the kind.
     """
     name, unit = split_unit(spelling)
     factor = UNITS[kind].get(_canonical(unit)) if unit else None
     if factor is None:
-        raise BadInput(where, f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix or in brackets",
-                       f"'{spelling}'{_suggestion(unit, kind)}")
+        raise BadInput(
+            where,
+            f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix or in brackets",
+            f"'{spelling}'{_suggestion(unit, kind)}",
+        )
     return Quantity(name, _canonical(unit), factor)
 
 
@@ -68,9 +71,9 @@ def split_unit(spelling: str) -> tuple[str, str]:
 def find_column(headers: tuple[str, ...], kind: str, asked: str | None, where: str) -> tuple[str, Quantity]:
     """Find the header that holds a quantity, and the unit in which it is written.
 
-    ``asked`` is the unit file's spelling, or None for the default column (then any header called time, torque or
-    angle with a known unit will do). Brackets may stand in the file, in ``asked``, or in both alike. Raises BadInput
-    for a missing or ambiguous column and for units that contradict each other.
+    ``asked`` is the unit file's spelling, or None for the default column (then any header called time, torque
+    or angle with a known unit will do). Brackets may stand in the file, in ``asked``, or in both alike.
+    Raises BadInput for a missing or ambiguous column and for units that contradict each other.
     """
     if asked is None:
         found = [h for h in headers if h == DEFAULT_COLUMNS[kind]] or [h for h in headers if _bare(h) == kind]
@@ -88,14 +91,20 @@ def _agreed(header: str, asked: str, kind: str, where: str) -> Quantity:
     spelled = [text for text in (asked, header) if _has_unit(text, kind)]
     quantities = [parse_quantity(text, kind, where) for text in spelled or [asked]]
     if len({quantity.to_si for quantity in quantities}) > 1:
-        raise BadInput(where, f"one unit for the {kind} column", f"'{asked}' asked for but '{header}' in the file")
+        raise BadInput(
+            where, f"one unit for the {kind} column", f"'{asked}' asked for but '{header}' in the file"
+        )
     return quantities[0]
 
 
 def _matching(headers, asked: str) -> list[str]:
     name = split_unit(asked)[0] if _BRACKETS.match(asked.strip()) else asked.strip()
-    for same in (lambda h: h == asked, lambda h: h.strip() == asked.strip(), lambda h: h.strip() == name,
-                 lambda h: bool(_BRACKETS.match(h.strip())) and split_unit(h)[0] == name):
+    for same in (
+        lambda h: h == asked,
+        lambda h: h.strip() == asked.strip(),
+        lambda h: h.strip() == name,
+        lambda h: bool(_BRACKETS.match(h.strip())) and split_unit(h)[0] == name,
+    ):
         found = [header for header in headers if same(header)]
         if found:
             return found

@@ -9,22 +9,36 @@ SHARE = 0.05  # a reversal smaller than this share of the peak-to-peak torque is
 _MAIN_SHARE = 0.35  # reversals of this share set the length of a typical segment
 _NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the smoothed noise is noise
 _BLOCKS_PER_SEGMENT = 64
-_MEDIAN_BLOCKS = 9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
+_LINE_POINTS = 2000  # block means lose nothing of a straight line
+_MEDIAN_BLOCKS = (
+    9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
+)
 
 
 def torque_noise(torque_nm: np.ndarray) -> float:
     """Robust standard deviation of the sample-to-sample torque noise, in N·m."""
     if len(torque_nm) < 3:
         return 0.0
-    # second differences: the ramp itself drops out
-    return float(1.4826 * np.median(np.abs(np.diff(torque_nm, 2))) / np.sqrt(6.0))
+    # second differences: the ramp itself drops out; twenty thousand of them tell the median to a percent
+    second = (
+        torque_nm[2:] - 2.0 * torque_nm[1:-1] + torque_nm[:-2]
+        if len(torque_nm) < 40_000
+        else _thinned(torque_nm)
+    )
+    return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0))
+
+
+def _thinned(torque: np.ndarray) -> np.ndarray:
+    at = np.arange(0, len(torque) - 2, len(torque) // 20_000)
+    return torque[at + 2] - 2.0 * torque[at + 1] + torque[at]
 
 
 def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
-    """Indices of the torque's reversals, accurate to some hundredth of a segment; empty for constant or monotone torque.
+    """Indices of the torque's reversals to a hundredth of a segment; none in constant or monotone torque.
 
-    Two passes: large reversals tell how long a segment is, then blocks of a fixed share of that length are searched
-    for all reversals, so that surges of the drive (short against the ramp, often as large as it) do not count.
+    Two passes: large reversals tell how long a segment is, then blocks of a fixed share of that length are
+    searched for all reversals, so that surges of the drive (short against the ramp, often as large as it) do
+    not count.
     """
     if len(torque_nm) < 3:
         return []
@@ -41,11 +55,12 @@ def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
 def refine_turning_point(time_s: np.ndarray, torque_nm: np.ndarray, left: int, turn: int, right: int) -> int:
     """Locate a reversal near ``turn`` to a sample or two, between its neighbours ``left`` and ``right``.
 
-    Robust lines through both flanks are intersected; with a dwell between equal slopes that is its middle. Where the
-    lines do not meet at the top (a long plateau, curved flanks), the middle of the top is returned.
+    Robust lines through both flanks are intersected; with a dwell between equal slopes that is its middle.
+    Where the lines do not meet at the top (a long plateau, curved flanks), the middle of the top is returned.
     """
     time, part, turn = time_s[left:right], torque_nm[left:right], turn - left
-    height = part if part[turn] >= 0.5 * (part[0] + part[-1]) else -part
+    top = np.median(part[max(turn - 2, 0) : turn + 3])
+    height = part if top >= 0.5 * (part[0] + part[-1]) else -part
     turn = _highest(height, turn)
     clean, noise = _levelled(height)
     middle = left + _middle(clean, turn, noise)
@@ -55,9 +70,10 @@ def refine_turning_point(time_s: np.ndarray, torque_nm: np.ndarray, left: int, t
         return middle
     rising, falling = _line(time[start:stop], height[start:stop]), _line(time[begin:end], height[begin:end])
     meeting = _intersection(rising, falling, time[turn])
-    if meeting is None or not time[stop - 1] <= meeting <= time[begin]:
+    first, last = stop - 1 - (stop - start) // 10, min(begin + (end - begin) // 10, len(time) - 1)
+    if meeting is None or not time[first] <= meeting <= time[last]:
         return middle
-    if _value(rising, meeting) > np.percentile(height[stop - 1 : begin + 1], 90) + 0.1 * np.ptp(height):
+    if _value(rising, meeting) > _percentile(height[stop - 1 : begin + 1], 90) + 0.1 * np.ptp(height):
         return middle
     index = int(np.searchsorted(time, meeting))
     return left + (index if time[index] - meeting <= meeting - time[index - 1] else index - 1)
@@ -110,20 +126,8 @@ def _zigzag(levels: list[float], threshold: float) -> list[int]:
     return turns
 
 
-def _highest(height: np.ndarray, left: int, turn: int, right: int) -> int:
-    """Highest sample of a smoothed copy near ``turn``; blocks and medians may have moved it along a short flank."""
-    before, after = turn - left, right - turn
-    reach = min(before // 2, after // 2, max(before, after) // 25 + 4)
-    part = height[turn - reach : turn + reach + 1]
-    if len(part) < 9:
-        return turn
-    smooth = uniform_filter1d(median_filter(part, 5, mode="nearest"), max(len(part) // 16, 1), mode="nearest")
-    tops = np.flatnonzero(smooth == smooth.max())
-    return turn - reach + int(tops[len(tops) // 2])
-
-
 def _highest(height: np.ndarray, turn: int) -> int:
-    """Highest sample of a smoothed copy near ``turn``; blocks and medians may have moved it along a short flank."""
+    """Highest sample of a smoothed copy near ``turn``, which blocks may have moved along a short flank."""
     before, after = turn, len(height) - turn
     reach = min(before // 2, after // 2, max(before, after) // 25 + 4)
     part = height[turn - reach : turn + reach + 1]
@@ -145,7 +149,7 @@ def _flank(height: np.ndarray, noise: float) -> tuple[int, int]:
     """Range of a rising flank that is clear of both its ends; ``height`` ends at the top."""
     if len(height) < 4:
         return 0, len(height)
-    low, high = np.percentile(height, [2, 98]) + np.array([2.0, -2.0]) * noise
+    low, high = _percentile(height, [2, 98]) + np.array([2.0, -2.0]) * noise
     # counting samples below a level finds its crossing on a monotone flank, whatever the noise
     start = int(np.count_nonzero(height < low + 0.3 * (high - low)))
     stop = int(np.count_nonzero(height < high - max(0.06 * (high - low), 2.0 * noise)))
@@ -155,23 +159,34 @@ def _flank(height: np.ndarray, noise: float) -> tuple[int, int]:
 def _middle(height: np.ndarray, turn: int, noise: float) -> int:
     """Middle of the samples at the top, between the crossings of one level on either side."""
     before, after = height[: turn + 1], height[turn:]
-    top = min(np.percentile(before, 98), np.percentile(after, 98)) - 2.0 * noise
+    top = min(_percentile(before, 98), _percentile(after, 98)) - 2.0 * noise
     level = top - max(0.06 * min(np.ptp(before), np.ptp(after)), 2.0 * noise)
     first, last = np.count_nonzero(before < level), len(height) - np.count_nonzero(after < level)
     return max(1, int(first + last) // 2)
 
 
+def _percentile(values: np.ndarray, percent):
+    return np.percentile(values[:: max(1, len(values) // 20_000)], percent)
+
+
 def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     """Line (time origin, level there, slope) through the samples, outliers trimmed once."""
+    block = max(1, len(x) // _LINE_POINTS)
+    x, y = _block_means(x, block), _block_means(y, block)
     origin = float(x.mean())
-    shifted, keep = x - origin, np.ones(len(x), bool)
-    for _ in range(2):
-        slope, level = np.polyfit(shifted[keep], y[keep], 1)
-        residual = np.abs(y - level - slope * shifted)
-        keep = residual <= 4.0 * 1.4826 * np.median(residual) + 1e-12 * np.abs(y).max()
-        if np.count_nonzero(keep) < 3:
-            break
-    return origin, float(level), float(slope)
+    level, slope = _least_squares(x - origin, y)
+    residual = np.abs(y - level - slope * (x - origin))
+    keep = residual <= 4.0 * 1.4826 * np.median(residual) + 1e-12 * np.abs(y).max()
+    if 3 <= np.count_nonzero(keep) < len(x):
+        level, slope = _least_squares(x[keep] - origin, y[keep])
+    return origin, level, slope
+
+
+def _least_squares(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Level at zero and slope of the straight line; closed form, as polyfit costs five times as much here."""
+    centre = float(x.mean())
+    slope = float((x - centre) @ y) / max(float((x - centre) @ (x - centre)), np.finfo(float).tiny)
+    return float(y.mean()) - slope * centre, slope
 
 
 def _value(line: tuple[float, float, float], time: float) -> float:

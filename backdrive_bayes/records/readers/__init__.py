@@ -27,8 +27,9 @@ def record_suffix(path: Path) -> str | None:
 def read_columns(path: Path, choose: Choose) -> Columns:
     """Read the columns of a record file that ``choose`` names, as float64 arrays of equal length.
 
-    ``choose`` is called once with the file's headers and returns those wanted, in order. Raises BadInput for anything
-    unreadable, not numeric, not finite or too large, MissingExtra where a format needs a package that is absent.
+    ``choose`` is called once with the file's headers and returns those wanted, in order. Raises BadInput for
+    anything unreadable, not numeric, not finite or too large, and MissingExtra where a format needs a package
+    that is absent.
     """
     suffix = record_suffix(path)
     if suffix is None:

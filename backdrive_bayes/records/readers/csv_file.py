@@ -33,8 +33,9 @@ class _Dialect:
 def read(path: Path, choose: Choose) -> Columns:
     """Read the chosen columns; the header is row 1 and samples start at row 2.
 
-    Separators are comma, semicolon or tab; decimal commas are read where the separator leaves no doubt. Text goes
-    through the C parser in bounded chunks; only when that fails is the file searched line by line for the culprit.
+    Separators are comma, semicolon or tab; decimal commas are read where the separator leaves no doubt. Text
+    goes through the C parser in bounded chunks; only when that fails is the file searched line by line for
+    the culprit.
     """
     dialect = _sniff(path)
     wanted = list(choose(dialect.headers))
@@ -42,7 +43,10 @@ def read(path: Path, choose: Choose) -> Columns:
         values = _parse(path, dialect, wanted)
     except BadInput:
         raise
-    except (ValueError, OverflowError) as error:  # the parser's own errors are ValueErrors and do not name the row
+    except (
+        ValueError,
+        OverflowError,
+    ) as error:  # the parser's own errors are ValueErrors and do not name the row
         raise _culprit(path, dialect, wanted, str(error)) from error
     values = _without_trailing_blanks(values)
     if not all(np.isfinite(value).all() for value in values):
@@ -54,9 +58,20 @@ def _parse(path: Path, dialect: _Dialect, wanted: list[str]) -> list[np.ndarray]
     import pandas  # imported here: it costs a quarter of a second that --help need not pay
 
     positions = [dialect.headers.index(name) for name in wanted]
-    options = dict(sep=dialect.separator, decimal=dialect.decimal, encoding=dialect.encoding, header=None, skiprows=1,
-                   names=range(len(dialect.headers)), usecols=sorted(set(positions)), dtype=np.float64, engine="c",
-                   index_col=False, skip_blank_lines=False, chunksize=_CHUNK_ROWS, float_precision="high")
+    options = dict(
+        sep=dialect.separator,
+        decimal=dialect.decimal,
+        encoding=dialect.encoding,
+        header=None,
+        skiprows=1,
+        names=range(len(dialect.headers)),
+        usecols=sorted(set(positions)),
+        dtype=np.float64,
+        engine="c",
+        index_col=False,
+        skip_blank_lines=False,
+        chunksize=_CHUNK_ROWS,
+    )
     chunks: list[list[np.ndarray]] = []
     with BoundedStream(path) as stream, pandas.read_csv(stream, **options) as frames:
         for frame in frames:
@@ -133,7 +148,9 @@ def _row_error(path: Path, dialect: _Dialect, columns, row: int, cells: list[str
         if not _is_finite(cell.replace(",", ".") if dialect.decimal == "," and "." not in cell else cell):
             mixed = _is_finite(cell.replace(",", "."))
             hint = f" (the file's decimal mark is '{dialect.decimal}')" if mixed else ""
-            return BadInput(f"{where}, column '{name}'", "a finite number", f"'{cell[:40]}'{hint}" if cell else "nothing")
+            return BadInput(
+                f"{where}, column '{name}'", "a finite number", f"'{cell[:40]}'{hint}" if cell else "nothing"
+            )
     return None
 
 

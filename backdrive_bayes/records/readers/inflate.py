@@ -32,7 +32,9 @@ class BoundedStream(io.RawIOBase):
         try:
             chunk = self._stream.read(min(len(buffer), 1 << 20))
         except BROKEN as error:
-            raise BadInput(self._path, "an intact compressed file", str(error) or type(error).__name__) from error
+            raise BadInput(
+                self._path, "an intact compressed file", str(error) or type(error).__name__
+            ) from error
         self._count += len(chunk)
         self._check()
         buffer[: len(chunk)] = chunk
@@ -48,8 +50,11 @@ class BoundedStream(io.RawIOBase):
     def _check(self) -> None:
         bomb = self._count > limits.FREE_INFLATED_BYTES and self._count > limits.MAX_INFLATION * self._size
         if bomb or self._count > limits.MAX_INFLATED_BYTES:
-            raise BadInput(self._path, f"at most 2 GB, and {limits.MAX_INFLATION} times the file's size, once inflated",
-                           f"more: {self._count / 1e6:.0f} MB already from {self._size / 1e6:.3g} MB")
+            raise BadInput(
+                self._path,
+                f"at most 2 GB, and {limits.MAX_INFLATION} times the file's size, once inflated",
+                f"more: {self._count / 1e6:.0f} MB already from {self._size / 1e6:.3g} MB",
+            )
 
 
 def _inflater(path: Path, file):

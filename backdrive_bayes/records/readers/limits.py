@@ -23,7 +23,7 @@ Choose = Callable[[tuple[str, ...]], Sequence[str]]
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Columns read from a file: float64 arrays (samples,); ``first_row`` is the file's row of sample 0, from 1."""
+    """Columns of a file, float64 arrays (samples,); ``first_row`` is the row of sample 0, counted from 1."""
 
     values: tuple[np.ndarray, ...]
     first_row: int = 1
@@ -51,7 +51,7 @@ def check_rows(path: Path, rows: int) -> None:
 
 
 def finite_columns(path: Path, headers: Sequence[str], arrays: Sequence, word: str = "sample") -> Columns:
-    """Convert a binary format's columns to float64; BadInput names the first sample that is not a finite number."""
+    """Convert a binary format's columns to float64; BadInput names the first sample that is not finite."""
     values = tuple(_as_float(path, header, array) for header, array in zip(headers, arrays, strict=True))
     lengths = [len(value) for value in values]
     if len(set(lengths)) > 1:
@@ -61,7 +61,9 @@ def finite_columns(path: Path, headers: Sequence[str], arrays: Sequence, word: s
     for header, value in zip(headers, values, strict=True):
         bad = np.flatnonzero(~np.isfinite(value))
         if bad.size:
-            raise BadInput(f"{path}, {word} {bad[0] + 1}, column '{header}'", "a finite number", f"{value[bad[0]]}")
+            raise BadInput(
+                f"{path}, {word} {bad[0] + 1}, column '{header}'", "a finite number", f"{value[bad[0]]}"
+            )
     return Columns(values)
 
 
@@ -73,4 +75,8 @@ def _as_float(path: Path, header: str, array) -> np.ndarray:
 
 
 def _reason(error: Exception) -> str:
-    return "nothing there" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None) or str(error)
+    return (
+        "nothing there"
+        if isinstance(error, FileNotFoundError)
+        else getattr(error, "strerror", None) or str(error)
+    )

@@ -13,7 +13,7 @@ _HDF5_MARK_AT = 512  # version 7.3 is HDF5 behind a 512-byte MATLAB header
 
 
 def read(path: Path, choose: Choose) -> Columns:
-    """Read the chosen variables, which must be vectors; the bound on their length is checked before any is read."""
+    """Read the chosen variables, which must be vectors; their length is checked before any is read."""
     with path.open("rb") as file:
         start = file.read(_HDF5_MARK_AT + 8)
     hdf5 = any(start[at : at + 4] == b"\x89HDF" for at in (0, _HDF5_MARK_AT))
@@ -31,8 +31,16 @@ def _read_classic(path: Path, choose: Choose):
         content = loadmat(path, variable_names=wanted, squeeze_me=False)
     except BadInput:
         raise
-    except (MatReadError, ValueError, TypeError, KeyError, OSError, EOFError, zlib.error,
-            NotImplementedError) as error:
+    except (
+        MatReadError,
+        ValueError,
+        TypeError,
+        KeyError,
+        OSError,
+        EOFError,
+        zlib.error,
+        NotImplementedError,
+    ) as error:
         raise BadInput(path, "a MATLAB file", str(error)[:120] or type(error).__name__) from error
     return wanted, [content[name] for name in wanted]
 
@@ -43,7 +51,11 @@ def _read_hdf5(path: Path, choose: Choose):
     try:
         with h5py.File(path, "r") as file:
             local = [name for name in file if isinstance(file.get(name, getlink=True), h5py.HardLink)]
-            shapes = {name: file[name].shape for name in local if isinstance(file[name], h5py.Dataset)}
+            shapes = {
+                name: file[name].shape
+                for name in local
+                if isinstance(file[name], h5py.Dataset) and not file[name].external
+            }
             wanted = _chosen(path, shapes, choose)
             return wanted, [file[name][()] for name in wanted]
     except BadInput:

@@ -1,0 +1,63 @@
+"""`check`: read a unit's records and judge them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backdrive_bayes.commands.output import default_out, say, write_folder, write_json
+
+HELP = "read and judge a unit's records: samples, branches, cycles, closure, noise"
+_ARCMIN = 10800.0 / 3.141592653589793
+
+
+def add_arguments(parser) -> None:
+    """Options of this verb."""
+    parser.add_argument("unit", type=Path, metavar="UNIT", help="unit folder or a bare record file")
+
+
+def run(args) -> int:
+    """Write check.json and show what it says; 0 also where inference is advised against."""
+    from backdrive_bayes.records.check import check_unit
+    from backdrive_bayes.records.unit_folder import read_unit
+
+    unit = read_unit(args.unit)
+    result = check_unit(unit)
+    out = args.out or default_out(unit.name, "check")
+    with write_folder(out) as folder:
+        write_json(folder / "check.json", result)
+    _summarise(result)
+    say(f"written to {out}/check.json")
+    return 0
+
+
+def _summarise(result: dict) -> None:
+    say(f"{result['unit']}: rated torque {result['rated_torque_Nm']:.4g} N·m")
+    for record in result["records"]:
+        say(f"  {record['record']}: {_extent(record)}")
+        say(f"    {_levels(record['noise'])}{_closure(record)}")
+    for message in result["messages"]:
+        say(f"  {message['level']}: {message['text']}")
+    say(f"inference {'may go on' if result['may_infer'] else 'should not go on'}: {result['reason']}")
+
+
+def _extent(record: dict) -> str:
+    amplitude = record["amplitude_Nm"]["estimated"]
+    rate = record["loading_rate_Nm_per_s"]["estimated"]
+    cycles = record["cycles"]
+    size = f"{record['samples']} samples in {record['duration_s']:.4g} s, ±{amplitude:.4g} N·m at {rate:.4g} N·m/s"
+    return f"{size}, {len(record['branches'])} branches, {cycles} cycle{'s'[: cycles != 1]}"
+
+
+def _levels(noise: dict) -> str:
+    correlated = f"{noise['correlated_rad'] * _ARCMIN:.2g}′ over {noise['correlation_time_s'] * 1e3:.3g} ms"
+    return (
+        f"angle noise {noise['white_rad'] * _ARCMIN:.2g}′ white, {correlated}; "
+        f"torque noise {noise['torque_Nm']:.2g} N·m"
+    )
+
+
+def _closure(record: dict) -> str:
+    closure = record["closure"]
+    if closure is None:
+        return ""
+    return f"; loop closes to {closure['difference_rad'] * _ARCMIN:.2g}′ ± {closure['sd_rad'] * _ARCMIN:.1g}′"

@@ -1,0 +1,86 @@
+"""The command line: verbs, common options, and exit code 2 with one line for whatever a user gets wrong."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from pathlib import Path
+
+from backdrive_bayes.errors import BadInput, MissingExtra
+
+# verb -> module of this package with HELP, add_arguments(parser) and run(args) -> exit code
+VERBS = {
+    "check": "check",
+    "fit": "fit",
+}
+_DESCRIPTION = (
+    "Bayesian inference of a robot reducer's geometric error, stiffness and friction from torque-angle loops."
+)
+
+
+class _Usage(Exception):
+    """A wrong command line; its text is the one line to show."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message):
+        raise _Usage(f"{message} (see '{self.prog} --help')")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command and return its exit code: 0 done, 2 bad input or usage, others as the verb says."""
+    from backdrive_bayes.commands.output import complain
+
+    argv = sys.argv[1:] if argv is None else list(argv)
+    try:
+        args = _parser(argv).parse_args(argv)
+        return args.run(args)
+    except SystemExit as done:  # --help and --version
+        return done.code if isinstance(done.code, int) else 0
+    except (BadInput, MissingExtra, OSError, _Usage) as error:
+        complain(error)
+        return 2
+    except MemoryError:
+        complain("not enough memory for this input")
+        return 2
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return 130
+
+
+def _parser(argv: list[str]) -> argparse.ArgumentParser:
+    parser = _Parser(prog="backdrive-bayes", description=_DESCRIPTION, allow_abbrev=False)
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and leave")
+    verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=_Parser)
+    # only the verb that is asked for is imported; --help needs them all
+    asked = next((word for word in argv if not word.startswith("-")), None)
+    for verb in [asked] if asked in VERBS else VERBS:
+        module = importlib.import_module(f"backdrive_bayes.commands.{VERBS[verb]}")
+        own = verbs.add_parser(verb, help=module.HELP, description=module.HELP, allow_abbrev=False)
+        module.add_arguments(own)
+        own.add_argument("-o", "--out", type=Path, metavar="OUT", help="folder to write into")
+        own.add_argument(
+            "--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers (default 0)"
+        )
+        own.set_defaults(run=module.run)
+    return parser
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser, namespace, values, option_string=None):
+        from importlib.metadata import PackageNotFoundError, version
+
+        from backdrive_bayes.commands.output import say
+
+        try:
+            say(f"backdrive-bayes {version('backdrive-bayes')}")
+        except PackageNotFoundError:
+            say("backdrive-bayes (not installed)")
+        parser.exit()
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or len(text) > 18:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0, found '{text}'")
+    return int(text)

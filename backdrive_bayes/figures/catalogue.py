@@ -1,0 +1,71 @@
+"""All figures of a result folder, drawn and saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backdrive_bayes.figures import amplitude, corner_plot, loop, modules, predictive, torque_energy, trace
+from backdrive_bayes.figures.saved import Saved
+from backdrive_bayes.figures.style import PER_FIGURE, SERIES, Figure, styled
+
+CAPTIONS = {
+    "loop": loop.CAPTION,
+    "modules": modules.CAPTION,
+    "torque-energy": torque_energy.CAPTION,
+    "amplitude": amplitude.CAPTION,
+    "corner": corner_plot.CAPTION,
+    "trace": trace.CAPTION,
+    "predictive": predictive.CAPTION,
+}
+PNG_DPI = 150
+
+
+def caption(name: str) -> str:
+    """What a figure of :func:`all_figures` shows, in words."""
+    return next(text for kind, text in CAPTIONS.items() if name == kind or name.startswith(f"{kind}-"))
+
+
+def all_figures(folder: Path) -> dict[str, Figure]:
+    """Every figure of one result folder of ``fit`` by name: loop, loop-2, … predictive."""
+    return figures_of(Saved.read(folder))
+
+
+def figures_of(saved: Saved) -> dict[str, Figure]:
+    """The same from results already read; those that need draws are left out where only the JSON is there."""
+    everything = list(range(len(saved.records)))
+    out = _split("loop", loop.draw, saved, everything, PER_FIGURE)
+    out |= _split("modules", modules.draw, saved, modules.distinct(saved), 1)
+    out |= _split("torque-energy", torque_energy.draw, saved, everything, PER_FIGURE)
+    out |= _split("amplitude", amplitude.draw, saved, everything, len(SERIES))
+    if saved.posterior_file:
+        out["corner"] = corner_plot.draw(saved)
+        out["trace"] = trace.draw(saved)
+        out |= _split("predictive", predictive.draw, saved, everything, PER_FIGURE)
+    return out
+
+
+def _split(name, draw, saved, records, at_most):
+    parts = [records[i : i + at_most] for i in range(0, len(records), at_most)]
+    return {name if i == 0 else f"{name}-{i + 1}": draw(saved, part) for i, part in enumerate(parts)}
+
+
+def save_figures(folder: Path, out: Path) -> list[Path]:
+    """Write every figure of ``folder`` into ``out`` as .svg and .png; the same results give the same bytes."""
+    out.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, figure in all_figures(folder).items():
+        written += [save_svg(figure, out / f"{name}.svg"), _save_png(figure, out / f"{name}.png")]
+    return written
+
+
+def save_svg(figure: Figure, path: Path) -> Path:
+    """Write one figure as SVG with text kept as text, without a date."""
+    with styled():
+        figure.savefig(path, format="svg", metadata={"Date": None})
+    return path
+
+
+def _save_png(figure, path):
+    with styled():
+        figure.savefig(path, format="png", dpi=PNG_DPI)
+    return path

@@ -1,0 +1,117 @@
+"""One look for all figures: sizes, colours that also read in grey print, units and labels."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from contextlib import contextmanager
+
+from backdrive_bayes.errors import MissingExtra
+
+try:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import matplotlib
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+        from matplotlib.ticker import MaxNLocator
+except ImportError:
+    raise MissingExtra("drawing figures", "matplotlib", "figures") from None
+
+WIDTH_IN = 170 / 25.4
+"""Width of every figure: the text width of an A4 page with 20 mm margins, so that font sizes print as they are set."""
+
+ARCMIN_PER_RAD = 180 * 60 / math.pi
+MJ_PER_J = 1e3
+PER_FIGURE = 3
+"""Records side by side in one figure; more records make more figures."""
+
+BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#007A5A"
+PURPLE, ORANGE, SKY, GREY = "#A3527F", "#E69F00", "#56B4E9", "#8C8C8C"
+
+RISING = {"color": BLUE, "linestyle": "-"}
+FALLING = {"color": VERMILLION, "linestyle": (0, (5, 2))}
+FIRST = {"color": BLACK, "linestyle": (0, (1, 1.5))}
+SERIES = (
+    {"color": BLUE, "linestyle": "-", "marker": "o"},
+    {"color": VERMILLION, "linestyle": (0, (5, 2)), "marker": "s"},
+    {"color": GREEN, "linestyle": (0, (1, 1.2)), "marker": "^"},
+    {"color": PURPLE, "linestyle": (0, (6, 2, 1, 2)), "marker": "D"},
+    {"color": BLACK, "linestyle": (0, (3, 1, 1, 1, 1, 1)), "marker": "v"},
+    {"color": ORANGE, "linestyle": (0, (8, 3)), "marker": "P"},
+)
+"""Colour, line and marker of series that share an axis; no two agree in line or marker."""
+
+_RC = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 8.5,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "lines.linewidth": 1.2,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    "axes.unicode_minus": True,
+    "text.parse_math": False,
+    # Text stays text, so that it can be selected and found in the PDF; the hash salt makes element ids repeatable.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "backdrive_bayes",
+}
+
+
+@contextmanager
+def styled():
+    """Draw or save within the style."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_RC)
+        yield
+
+
+def new_figure(height_in: float, constrained: bool = True) -> Figure:
+    """An empty figure of page width and the given height [inch] that needs no display."""
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained" if constrained else None)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def few_ticks(axes, x: int = 4, y: int = 5) -> None:
+    """At most ``x`` and ``y`` steps between round tick labels."""
+    axes.xaxis.set_major_locator(MaxNLocator(x, steps=[1, 2, 2.5, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(y, steps=[1, 2, 2.5, 5, 10]))
+
+
+def record_labels(records) -> list[str]:
+    """A short, unique name for each record object: its rate, with the amplitude or a number where rates repeat."""
+    labels = [f"{r['loading_rate_Nm_per_s']:.2g} N·m/s" for r in records]
+    if len(set(labels)) < len(labels):
+        labels = [f"{a}, ±{r['amplitude_Nm']:.2g} N·m" for a, r in zip(labels, records, strict=True)]
+    if len(set(labels)) < len(labels):
+        labels = [f"{a} (no. {i})" for i, a in enumerate(labels, 1)]
+    return labels
+
+
+DISPLAY_UNITS = {
+    "rad": (ARCMIN_PER_RAD, "arcmin"),
+    "rad/(N·m)": (ARCMIN_PER_RAD, "arcmin/(N·m)"),
+    "J": (MJ_PER_J, "mJ"),
+    "1": (1.0, ""),
+}
+
+
+def display_unit(unit: str) -> tuple[float, str]:
+    """Factor and name of the unit in which a quantity saved in ``unit`` is shown."""
+    return DISPLAY_UNITS.get(unit, (1.0, unit))
+
+
+def words(name: str) -> str:
+    """A parameter's or module's name in words."""
+    return name.replace("_", " ")

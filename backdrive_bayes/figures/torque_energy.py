@@ -1,0 +1,59 @@
+"""The torque–energy curve with its band and the ranges W1, W2 and W3."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.figures.saved import Saved
+from backdrive_bayes.figures.style import BLACK, BLUE, MJ_PER_J, few_ticks, new_figure, record_labels, styled
+
+CAPTION = (
+    "Torque–energy curve: energy dissipated per unit of torque, median and interval, with the ranges W1 (|τ| ≤ τ₁), "
+    "W2 (τ₁ < |τ| ≤ τ₂) and W3 (beyond τ₂)."
+)
+ZOOM_BELOW = 0.25
+"""Where τ₂ lies below this share of the amplitude, a second row shows the low torques enlarged."""
+ZOOM_TAU2 = 3.0
+SHADES = (("W1", "#9A9A9A", "////"), ("W2", "#CFCFCF", ""), ("W3", "#F2F2F2", ""))
+
+
+def draw(saved: Saved, records: list[int]):
+    """Curves of the given records in columns, mJ per N·m over |torque| [N·m]."""
+    zoom = any(_tau(saved, r)[1] < ZOOM_BELOW * saved.records[r]["amplitude_Nm"] for r in records)
+    with styled():
+        figure = new_figure(3.6 if zoom else 2.7)
+        axes = figure.subplots(1 + zoom, len(records), sharey=True, squeeze=False)
+        labels = record_labels(saved.records)
+        for column, record in enumerate(records):
+            for row in range(1 + zoom):
+                _curve(axes[row, column], saved, record, row == 1)
+            tau1, tau2 = _tau(saved, record)
+            axes[0, column].set_title(f"{labels[record]}\nτ₁ {tau1:.2g}, τ₂ {tau2:.2g} N·m")
+            axes[-1, column].set_xlabel("|torque| [N·m]")
+        for row in axes:
+            row[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
+        handles, names = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+    return figure
+
+
+def _tau(saved, record):
+    curve = saved.records[record]["torque_energy"]
+    return [(curve[key] or {"median": np.nan})["median"] for key in ("tau1_Nm", "tau2_Nm")]
+
+
+def _curve(axes, saved, record, zoomed):
+    curve = saved.records[record]["torque_energy"]
+    torque, end = np.asarray(curve["torque_Nm"]), saved.records[record]["amplitude_Nm"]
+    tau1, tau2 = _tau(saved, record)
+    lo, hi, median = (np.asarray(curve[k]) * MJ_PER_J for k in ("lo", "hi", "median_J_per_Nm"))
+    edges = (0.0, tau1, tau2, end)
+    for (name, colour, hatch), a, b in zip(SHADES, edges, edges[1:], strict=False):
+        axes.axvspan(a, b, facecolor=colour, hatch=hatch, edgecolor="white", linewidth=0, alpha=0.8, label=name)
+    axes.fill_between(torque, lo, hi, color=BLUE, alpha=0.4, linewidth=0)
+    axes.plot(torque, median, color=BLUE, label=f"median and {100 * saved.indicators['level']:.3g} % interval")
+    axes.axvline(tau1, color=BLACK, linestyle=(0, (1, 1.2)), linewidth=1, label="τ₁")
+    axes.axvline(tau2, color=BLACK, linestyle=(0, (5, 2)), linewidth=1, label="τ₂")
+    axes.set_xlim(0, min(end, ZOOM_TAU2 * tau2) if zoomed else end)
+    axes.set_ylim(0, None)
+    few_ticks(axes)

@@ -1,0 +1,71 @@
+"""Faults of a recorded channel: gaps, drop-outs, plateaus and frozen stretches."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+_GAP_STEPS = 5.0
+_WILD_SD = 12.0
+_PLATEAU_TIMES = 4.0  # a triangle spends 5 % of its time in the top 5 %; so many times that is no triangle
+_MOST_LISTED = 20
+
+
+def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:
+    """Time steps far longer than those around them, with the share of the torque range passed meanwhile."""
+    steps = np.diff(time_s)
+    if steps.max() <= _GAP_STEPS * np.median(steps):
+        return []
+    usual = np.maximum(median_filter(steps, 51, mode="nearest"), np.finfo(float).tiny)
+    span = float(np.ptp(torque_nm))
+    at = np.flatnonzero(steps > _GAP_STEPS * usual)
+    return [
+        {
+            "at_s": float(time_s[k]),
+            "seconds": float(steps[k]),
+            "torque_share": float(abs(torque_nm[k + 1] - torque_nm[k]) / span),
+        }
+        for k in at[:_MOST_LISTED]
+    ]
+
+
+def count_wild(values: np.ndarray) -> int:
+    """Number of isolated samples (drop-outs, spikes) far from the running median of five."""
+    if len(values) < 5:
+        return 0
+    off = np.abs(values - median_filter(values, 5, mode="nearest"))
+    usual = 1.4826 * float(np.median(off[off > 0.0])) if np.any(off > 0.0) else 0.0
+    return int(np.count_nonzero(off > max(_WILD_SD * usual, 0.02 * float(np.ptp(values)))))
+
+
+def find_plateaus(time_s: np.ndarray, torque_nm: np.ndarray, low: float, high: float) -> list[dict]:
+    """Torque levels ``low`` or ``high`` at which the record stays far longer than a ramp that turns there."""
+    seconds = np.diff(time_s, append=time_s[-1])
+    found = []
+    for level, side in ((high, torque_nm > 0.0), (low, torque_nm < 0.0)):
+        near = side & (np.abs(torque_nm) > 0.95 * abs(level))
+        share = float(seconds[near].sum() / max(seconds[side].sum(), np.finfo(float).tiny))
+        if share > 0.05 * _PLATEAU_TIMES:
+            found.append({"torque_Nm": level, "seconds": float(seconds[near].sum()), "share": share})
+    return found
+
+
+def longest_frozen(values: np.ndarray, other: np.ndarray) -> dict:
+    """Longest run of exactly equal values, and the share of the other channel's range passed meanwhile."""
+    edges = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]))
+    run = int(np.argmax(np.diff(edges)))
+    start, stop = int(edges[run]), int(edges[run + 1])
+    tip = max(1, (stop - start) // 20)
+    moved = abs(float(np.mean(other[stop - tip : stop]) - np.mean(other[start : start + tip])))
+    span = float(np.ptp(other))
+    return {"start": start, "samples": stop - start, "other_share": moved / span if span > 0.0 else 0.0}
+
+
+def quantum(values: np.ndarray) -> float | None:
+    """Step of a coarsely quantised channel, None where the values are practically continuous."""
+    levels = np.unique(values)
+    if len(levels) < 2 or len(levels) > 0.5 * len(values):
+        return None
+    steps = np.diff(levels)
+    step = float(np.median(steps))
+    return step if np.mean(np.abs(steps / step - np.round(steps / step)) < 0.05) > 0.9 else None

@@ -1,0 +1,109 @@
+"""Read a unit: a folder with ``unit.toml`` and record files, or one bare record file."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.records.clock import strictly_rising
+from backdrive_bayes.records.plausible import check_plausible
+from backdrive_bayes.records.quantities import find_column
+from backdrive_bayes.records.readers import READERS, read_columns, record_suffix
+from backdrive_bayes.records.readers.limits import Columns
+from backdrive_bayes.records.record import Record, Unit
+from backdrive_bayes.records.unit_toml import FILE_NAME, RecordEntry, read_unit_toml
+
+_KINDS = ("time", "torque", "angle")
+
+
+def read_unit(path: Path | str) -> Unit:
+    """Read the unit at ``path``, a unit folder or a record file of any readable format.
+
+    Everything is converted to SI units. Raises BadInput (file, row or key, what was expected, what was found)
+    for anything that cannot be a torque-angle record, MissingExtra where a format's reader is not installed.
+    """
+    path = Path(path)
+    if path.name == FILE_NAME and path.is_file():
+        path = path.parent
+    if path.is_dir():
+        return _read_folder(path)
+    if not path.exists():
+        raise BadInput(path, "a unit folder or a record file", "nothing there")
+    return _read_bare(path)
+
+
+def _read_folder(folder: Path) -> Unit:
+    entry = read_unit_toml(folder)
+    records = tuple(_read_record(record, entry.rated_torque_nm) for record in entry.records)
+    return Unit(
+        name=entry.name,
+        rated_torque_nm=entry.rated_torque_nm,
+        records=records,
+        reduction_ratio=entry.reduction_ratio,
+        identity=entry.identity,
+        notes=entry.notes,
+        data_hash=_hash([folder / FILE_NAME, *(record.path for record in entry.records)]),
+    )
+
+
+def _read_bare(path: Path) -> Unit:
+    suffix = record_suffix(path)
+    if suffix is None:
+        raise BadInput(path, f"a unit folder or a file ending in {', '.join(READERS)}", f"'{path.name}'")
+    record = _read_record(RecordEntry(path, path.name), None)
+    rated = float(np.abs(record.torque_nm).max())
+    note = f"no rated torque given: T_r taken as the largest torque, {rated:.4g} N·m"
+    return Unit(
+        path.name[: -len(suffix)] or path.name, rated, (record,), notes=(note,), data_hash=_hash([path])
+    )
+
+
+def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
+    quantities = []
+
+    def choose(headers: tuple[str, ...]) -> list[str]:
+        found = [find_column(headers, kind, entry.columns.get(kind), str(entry.path)) for kind in _KINDS]
+        _refuse_shared(entry.path, [header for header, _ in found])
+        quantities.extend(quantity for _, quantity in found)
+        return [header for header, _ in found]
+
+    columns = read_columns(entry.path, choose)
+    _check_length(entry.path, columns)
+    time, torque, angle = (
+        value * quantity.to_si for value, quantity in zip(columns.values, quantities, strict=True)
+    )
+    time, notes = strictly_rising(time, columns.first_row, str(entry.path))
+    record = Record(
+        entry.name,
+        time,
+        torque,
+        angle,
+        entry.loading_rate_nm_per_s,
+        entry.amplitude_nm,
+        columns.notes + notes,
+    )
+    check_plausible(record, rated_torque_nm, str(entry.path))
+    return record
+
+
+def _refuse_shared(path: Path, headers: list[str]) -> None:
+    if len(set(headers)) < len(headers):
+        raise BadInput(path, "three different columns for time, torque and angle", ", ".join(headers))
+
+
+def _check_length(path: Path, columns: Columns) -> None:
+    count = len(columns.values[0])
+    if count < 2:
+        raise BadInput(path, "a record of many samples", f"{count} sample{'s'[: count != 1]}")
+
+
+def _hash(paths: list[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in paths:
+        with path.open("rb") as file:
+            while chunk := file.read(1 << 20):
+                digest.update(chunk)
+    return digest.hexdigest()

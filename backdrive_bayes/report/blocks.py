@@ -1,0 +1,97 @@
+"""The building blocks of a page: plain data that the template lays out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+
+@dataclass(frozen=True)
+class Block:
+    """Something that a page is made of; ``kind`` names the template's function for it."""
+
+    kind: ClassVar[str]
+
+    def data(self) -> dict[str, Any]:
+        """The block as JSON data."""
+        return {"kind": self.kind} | {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True)
+class Heading(Block):
+    """A heading that also enters the outline."""
+
+    kind = "heading"
+    text: str
+    level: int = 2
+
+
+@dataclass(frozen=True)
+class Paragraph(Block):
+    """Running text."""
+
+    kind = "paragraph"
+    text: str
+
+
+@dataclass(frozen=True)
+class Note(Block):
+    """Small text beneath a table."""
+
+    kind = "note"
+    text: str
+
+
+@dataclass(frozen=True)
+class Banner(Block):
+    """A verdict in a frame; ``tone`` is "good", "caution" or "bad"."""
+
+    kind = "banner"
+    tone: str
+    title: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Facts(Block):
+    """Pairs of a name and its value."""
+
+    kind = "facts"
+    rows: list[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Table(Block):
+    """Rows under column names; a cell of two texts has the second one small beneath; ``widths`` in shares (0: as wide as needed)."""
+
+    kind = "table"
+    columns: list[str]
+    rows: list[list[str | list[str]]]
+    widths: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Picture(Block):
+    """A figure by name, with its caption (which is also its alternative text)."""
+
+    kind = "picture"
+    name: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Signature(Block):
+    """Lines to be filled in by hand."""
+
+    kind = "signature"
+    labels: list[str]
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What one result contributes: a summary of one page, details, and the figures that its pictures name."""
+
+    title: str
+    summary: list[Block]
+    details: list[Block]
+    figures: dict[str, Any]

@@ -1,0 +1,128 @@
+"""The chapter of a fit: summary page, then what stands behind it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backdrive_bayes.figures.catalogue import caption, figures_of
+from backdrive_bayes.figures.saved import Saved
+from backdrive_bayes.figures.style import PER_FIGURE, display_unit, record_labels, words
+from backdrive_bayes.report import fit_tables as tables
+from backdrive_bayes.report.blocks import Banner, Block, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature
+from backdrive_bayes.report.numbers import interval_text, level_text, prior_text
+from backdrive_bayes.report.text import free
+
+ON_SUMMARY = 2 * PER_FIGURE
+"""Records whose indicators fit on the summary page."""
+
+
+def chapter(folder: Path) -> Chapter:
+    """Read a result folder of ``fit`` and lay out its pages."""
+    saved = Saved.read(folder)
+    figures = figures_of(saved)
+    shown = ["loop"] if len(saved.records) <= PER_FIGURE else []
+    rest = [name for name in figures if name not in shown]
+    return Chapter(
+        free(saved.indicators["unit"], 80),
+        [
+            Heading(free(saved.indicators["unit"], 80), 1),
+            _verdict(saved),
+            _identity(saved),
+            Heading("Key indicators"),
+            *tables.indicators(saved, ON_SUMMARY),
+            *[Picture(name, caption(name)) for name in shown],
+            Signature(["Reviewed by", "Date", "Signature"]),
+        ],
+        _details(saved, rest),
+        figures,
+    )
+
+
+def _verdict(saved):
+    found = saved.indicators["convergence"]
+    numbers = (
+        f"Largest R-hat {found['max_rhat']:.3f}; smallest effective sample size {found['min_bulk_ess']:.0f} (bulk) and "
+        f"{found['min_tail_ess']:.0f} (tail)."
+    )
+    if found["converged"]:
+        return Banner("good", "CONVERGED: the intervals may be used", numbers)
+    advice = found.get("advice") or "Sample longer and report again."
+    return Banner("bad", "INCONCLUSIVE: the sampling has not converged", f"Do not use these intervals. {advice} {numbers}")
+
+
+def _identity(saved):
+    about, attributes, records = saved.indicators, saved.attributes(), saved.records
+    identity = dict(about.get("identity") or {})
+    credit = [(key.capitalize(), free(identity.pop(key))) for key in ("credit", "license") if key in identity]
+    rows = [("Unit", free(about["unit"])), *((free(words(k).capitalize(), 40), free(v)) for k, v in identity.items())]
+    if "rated_torque_nm" in attributes:
+        rows.append(("Rated torque", f"{attributes['rated_torque_nm']:g} N·m"))
+    rows += [
+        ("Records", f"{len(records)}: loading rates {', '.join(record_labels(records))}"),
+        ("Model", " + ".join(words(m) for m in [*about["model"]["modules"], *about["model"]["effects"]])),
+        ("Intervals", f"central {level_text(about['level'])} credible intervals, written median [low, high]"),
+    ]
+    if attributes.get("data_sha256"):
+        rows.append(("Data, SHA-256", attributes["data_sha256"]))
+    return Facts(rows + credit)
+
+
+def _details(saved, figures) -> list[Block]:
+    def pictures(kind):
+        return [Picture(n, caption(n)) for n in figures if n == kind or n.startswith(f"{kind}-")]
+
+    loops = pictures("loop")
+    more = tables.indicators(saved) if len(saved.records) > ON_SUMMARY else []
+    return [
+        *([Heading("Loops"), *loops] if loops else []),
+        *([Heading("Indicators of all records"), *more] if more else []),
+        Heading("Module decomposition"),
+        *pictures("modules"),
+        *tables.mechanism(saved),
+        Heading("Torque–energy curve"),
+        *pictures("torque-energy"),
+        *tables.humps(saved),
+        *tables.back_drive(saved),
+        Heading("Loops of smaller amplitude"),
+        *pictures("amplitude"),
+        *tables.by_amplitude(saved),
+        *_parameters(saved),
+        *tables.noise(saved),
+        *tables.least_squares(saved),
+        Heading("Diagnostics"),
+        *tables.convergence(saved),
+        *pictures("trace"),
+        *pictures("predictive"),
+        *pictures("corner"),
+        *_reproduction(saved),
+    ]
+
+
+def _parameters(saved):
+    rows = []
+    for name, about in saved.indicators["parameters"].items():
+        factor, unit = display_unit(about["unit"])
+        rows.append([tables.quantity_name(saved, name), interval_text(about, factor), unit or "–", prior_text(about["prior"], factor)])
+    return [
+        Heading("Parameters and priors"),
+        tables.parameter_table(rows, saved.indicators["level"]),
+        Note("Priors are stated in the unit of the row."),
+    ]
+
+
+def _reproduction(saved):
+    attributes = saved.attributes()
+    if not attributes:
+        return []
+    rows = [
+        ("Software", attributes["versions"]),
+        ("Sampler", f"{attributes['inference_library']} {attributes['inference_library_version']}"),
+        ("Seed", str(attributes["seed"])),
+        ("Data, SHA-256", attributes["data_sha256"] or "not recorded"),
+        ("Time", f"{saved.indicators['convergence']['seconds']:.0f} s for reduction and sampling"),
+    ]
+    return [
+        Heading("Reproduction"),
+        Paragraph("The same data, versions and seed give the same result bit for bit."),
+        Facts(rows),
+    ]

@@ -1,0 +1,197 @@
+"""The tables of a fit's chapter, from the saved indicators alone."""
+
+from __future__ import annotations
+
+from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, record_labels, words
+from backdrive_bayes.report.blocks import Heading, Note, Paragraph, Table
+from backdrive_bayes.report.numbers import interval_text, level_text, like_interval, percent, significant
+from backdrive_bayes.report.text import free
+
+INDICATORS = (
+    ("lost_motion_rad", "Lost motion δ", "arcmin", ARCMIN_PER_RAD),
+    ("zero_torque_width_rad", "Width at zero torque w(0)", "arcmin", ARCMIN_PER_RAD),
+    ("peak_angle_rad", "Peak angle", "arcmin", ARCMIN_PER_RAD),
+    ("loop_area_J", "Dissipated energy S", "mJ", MJ_PER_J),
+    ("absorbed_J", "Absorbed energy W_abs", "mJ", MJ_PER_J),
+    ("dissipation_ratio", "Dissipation ratio u = S/W_abs", "–", 1.0),
+)
+"""Key in indicators.json, name, display unit and factor of the contract's indicators."""
+
+
+def indicators(saved, at_most: int | None = None) -> list:
+    """Tables of the indicators with the share that model error has in each interval, three records side by side."""
+    records, labels = saved.records[:at_most], record_labels(saved.records)
+    level, k = level_text(saved.indicators["level"]), saved.indicators["k"]
+    blocks = []
+    for i in range(0, len(records), PER_FIGURE):
+        part = records[i : i + PER_FIGURE]
+        rows = [
+            [name, unit, *(_with_share(r["indicators"].get(key), factor) for r in part)]
+            for key, name, unit, factor in INDICATORS
+        ]
+        blocks.append(Table(["Indicator", "Unit", *labels[i : i + PER_FIGURE]], rows, [1.6, 0, *[1.4] * len(part)]))
+    left = len(saved.records) - len(records)
+    more = f" {left} further records follow on the next pages." if left > 0 else ""
+    blocks.append(
+        Note(
+            f"Median [{level} interval] of the reducer's own settled loop. δ is taken at ±kT_r with k = {k:g}. The share beneath "
+            f"each interval is the part of its squared width that is due to model error.{more}"
+        )
+    )
+    return blocks
+
+
+def _with_share(entry, factor):
+    text = interval_text(entry, factor)
+    if not entry or "model_error_share" not in entry:
+        return text
+    return [text, f"{percent(entry['model_error_share'])} from model error"]
+
+
+def _by_record(saved, columns, cells):
+    """One row a record under ``Record`` and ``columns``."""
+    rows = [[label, *cells(r)] for label, r in zip(record_labels(saved.records), saved.records, strict=True)]
+    return Table(["Record", *columns], rows, [1.3, *[1.0] * len(columns)])
+
+
+def mechanism(saved) -> list:
+    """Areas that the geometric and friction modules enclose, and what a load turns and stores."""
+
+    def split(r):
+        m = r["mechanism"]
+        return [interval_text(m.get(f"S_{x}_J"), MJ_PER_J) for x in "gf"] + [
+            interval_text(m.get(f"S_{x}_over_S")) for x in "gf"
+        ]
+
+    return [
+        _by_record(saved, ["S_g [mJ]", "S_f [mJ]", "S_g/S [–]", "S_f/S [–]"], split),
+        Note("S_g and S_f: energy that the geometric error and friction dissipate in a cycle; what is left of S is model error."),
+    ]
+
+
+def back_drive(saved) -> list:
+    """What a load turns and stores."""
+
+    def cells(r):
+        b = r["back_drive"]
+        angle, energy = interval_text(b["theta_L_rad"], ARCMIN_PER_RAD), interval_text(b["W_L_J"], MJ_PER_J)
+        return [significant(b["load_Nm"]), angle, energy]
+
+    return [
+        Heading("Back-drive"),
+        _by_record(saved, ["load τ_L [N·m]", "angle turned θ_L [arcmin]", "energy absorbed W_L [mJ]"], cells),
+        Note("Angle turned and energy absorbed when the load arrives at zero torque on the rising branch of the settled loop."),
+    ]
+
+
+def humps(saved) -> list:
+    """Bounds of the ranges W1, W2 and W3."""
+
+    def cells(r):
+        return [interval_text(r["torque_energy"][key]) for key in ("tau1_Nm", "tau2_Nm")] + [significant(r["amplitude_Nm"])]
+
+    return [
+        _by_record(saved, ["τ₁ [N·m]", "τ₂ [N·m]", "amplitude T [N·m]"], cells),
+        Note("τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's convention)."),
+    ]
+
+
+def by_amplitude(saved) -> list:
+    """Extremes and means of S(t) and u(t)."""
+    keys = [(q, f) for q in ("S", "u") for f in ("max", "min", "mean")]
+
+    def cells(r):
+        own, factor = r["by_amplitude"], {"S": MJ_PER_J, "u": 1.0}
+        return [interval_text(own.get(f"{f}_{q}_J" if q == "S" else f"{f}_{q}"), factor[q]) for q, f in keys]
+
+    labels = record_labels(saved.records)
+    names = [f"S {f} [mJ]" if q == "S" else f"u {f} [–]" for q, f in keys]
+    values = [cells(r) for r in saved.records]
+    blocks = []
+    for i in range(0, len(labels), PER_FIGURE):
+        part = slice(i, i + PER_FIGURE)
+        rows = [[name, *(v[j] for v in values[part])] for j, name in enumerate(names)]
+        blocks.append(Table(["Over all t", *labels[part]], rows, [1.0, *[1.3] * len(labels[part])]))
+    return blocks
+
+
+def parameter_table(rows, level: float) -> Table:
+    """Parameters with posterior and prior."""
+    return Table(["Parameter", f"Posterior, {level_text(level)}", "Unit", "Prior"], rows, [1.5, 1.35, 0, 1.6])
+
+
+def noise(saved) -> list:
+    """Noise levels of each record."""
+
+    def cells(r):
+        n = r["noise"]
+        angles = [significant(n[k] * ARCMIN_PER_RAD, 2) for k in ("white_rad", "correlated_rad")]
+        return [*angles, significant(n["correlation_time_s"] * 1e3, 2), significant(n["torque_Nm"] * 1e3, 2)]
+
+    error = saved.indicators["model_error"]["scale_rad"] * ARCMIN_PER_RAD
+    return [
+        Heading("Noise and model error"),
+        _by_record(saved, ["white [arcmin]", "correlated [arcmin]", "correlation time [ms]", "torque [mN·m]"], cells),
+        Note(f"Standard deviations. The smooth model error has a prior standard deviation of {significant(error, 2)} arcmin."),
+    ]
+
+
+def quantity_name(saved, name: str) -> str:
+    """A sampled quantity in words; ``name[1]`` is that of the second record."""
+    base, bracket, record = name.partition("[")
+    if bracket and record[:-1].isdecimal() and int(record[:-1]) < len(saved.records):
+        return f"{words(base)}, {record_labels(saved.records)[int(record[:-1])]}"
+    return free(words(name))
+
+
+def convergence(saved) -> list:
+    """Convergence numbers."""
+    found = saved.indicators["convergence"]
+    row = [
+        "yes" if found["converged"] else "NO",
+        f"{found['max_rhat']:.4f}",
+        f"{found['min_bulk_ess']:.0f}",
+        f"{found['min_tail_ess']:.0f}",
+        quantity_name(saved, found.get("worst", "–")),
+    ]
+    columns = ["Converged", "largest R-hat", "smallest bulk ESS", "smallest tail ESS", "slowest quantity"]
+    return [
+        Table(columns, [row], [0.8, 0.9, 1.1, 1.1, 1.8]),
+        Note(
+            "Rank-normalised split R-hat and effective sample sizes (ESS) over independent ensembles, for every parameter and "
+            "indicator. Converged means R-hat below 1.01 and both ESS at least 1000 for all of them."
+        ),
+    ]
+
+
+def least_squares(saved) -> list:
+    """The classic fit next to the posterior; nothing where it was not saved."""
+    blocks = []
+    for label, record in zip(record_labels(saved.records), saved.records, strict=True):
+        classic = record.get("least_squares") or {}
+        if classic.get("indicators"):
+            blocks.append(_classic_table(label, record, classic["indicators"], saved.indicators["level"]))
+        if classic.get("branches"):
+            blocks.append(Note("; ".join(_branch(n, b) for n, b in classic["branches"].items()) + "."))
+    if not blocks:
+        return []
+    text = (
+        "The classic evaluation fits eq. (20), reconstructed, to each branch by least squares. It gives no intervals; its "
+        "branches do not close at ±T and constant friction hides in its offset, so its S is usually too small."
+    )
+    return [Heading("Classic least-squares fit"), Paragraph(text), *blocks]
+
+
+def _classic_table(label, record, classic, level):
+    rows = []
+    for key, name, unit, factor in INDICATORS:
+        own = record["indicators"].get(key)
+        rows.append([name, unit, interval_text(own, factor), like_interval(classic.get(key), own, factor)])
+    return Table([label, "Unit", f"Posterior, {level_text(level)}", "Least squares"], rows, [1.6, 0, 1.3, 1.0])
+
+
+def _branch(name, branch):
+    ratio = branch.get("rms_high_load_over_rest")
+    high = f", rms above 0.8 T_r over the rest {significant(ratio, 2)}" if ratio is not None else ""
+    rms = significant(branch["rms_rad"] * ARCMIN_PER_RAD, 2)
+    return f"{name} branch: R² = {branch['r_squared']:.4f}, rms residual {rms} arcmin{high}"

@@ -1,0 +1,74 @@
+"""Values and intervals as text with sensible digits."""
+
+from __future__ import annotations
+
+import math
+import re
+
+MOST_DECIMALS = 8
+_LOG_NORMAL = re.compile(r"log-normal, median (\S+), log-sd (\S+)")
+_UNIFORM = re.compile(r"uniform on \[(\S+), (\S+)\]")
+
+
+def decimals(spread: float, value: float) -> int:
+    """Decimals that show ``spread`` (half an interval) to one or two digits, or ``value`` to three without a spread."""
+    spread, value = abs(spread), abs(value)
+    if spread == 0 or not math.isfinite(spread):
+        return 3 if value == 0 else max(0, min(MOST_DECIMALS, 2 - math.floor(math.log10(value))))
+    power = math.floor(math.log10(spread))
+    # One unit of the last digit is then at most a third of the half-width.
+    return max(0, min(MOST_DECIMALS, -power + (spread < 2.95 * 10**power)))
+
+
+def interval_text(interval: dict | None, factor: float = 1.0) -> str:
+    """``median [lo, hi]`` times ``factor`` with the same decimals; "not defined" for None."""
+    if interval is None:
+        return "not defined"
+    median, lo, hi = (factor * interval[k] for k in ("median", "lo", "hi"))
+    n = decimals(0.5 * (hi - lo), median)
+    return f"{_fixed(median, n)} [{_fixed(lo, n)}, {_fixed(hi, n)}]"
+
+
+def like_interval(value: float | None, interval: dict | None, factor: float = 1.0) -> str:
+    """A single value with the decimals of the interval beside it."""
+    if value is None:
+        return "not defined"
+    spread = 0.5 * (interval["hi"] - interval["lo"]) if interval else 0.0
+    return _fixed(factor * value, decimals(factor * spread, factor * value))
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """A value to some significant digits, without exponent where it can be helped."""
+    if value is None or not math.isfinite(value):
+        return "not defined"
+    if value == 0:
+        return "0"
+    power = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    if not -6 <= power <= 6:
+        return f"{value:.{digits - 1}e}".replace("-", "−")
+    return _fixed(value, max(0, digits - 1 - power))
+
+
+def percent(share: float | None) -> str:
+    """A share as per cent."""
+    return "–" if share is None else f"{100 * share:.3g} %" if share < 0.01 else f"{100 * share:.0f} %"
+
+
+def level_text(level: float) -> str:
+    """The level of intervals as per cent."""
+    return f"{100 * level:.3g} %"
+
+
+def prior_text(prior: str, factor: float) -> str:
+    """A prior's description with its scale in the display unit; left as it is where it is of a kind not known here."""
+    if found := _LOG_NORMAL.fullmatch(prior):
+        return f"log-normal, median {factor * float(found[1]):.4g}, log-sd {found[2]}"
+    if found := _UNIFORM.fullmatch(prior):
+        lo, hi = (factor * float(v) for v in found.groups())
+        return f"uniform on [{lo:.4g}, {hi:.4g}]".replace("-", "−")
+    return prior if factor == 1.0 else f"{prior} (SI units)"
+
+
+def _fixed(value: float, n: int) -> str:
+    text = f"{value:.{n}f}"
+    return text.lstrip("-") if float(text) == 0 else text.replace("-", "−")

@@ -1,0 +1,110 @@
+"""Result folders to one PDF: figures as SVG, text as JSON, compiled by Typst in process."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterable
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+
+from backdrive_bayes.errors import MissingExtra
+from backdrive_bayes.report.text import Free, every_string, free, map_strings, printable, typeset
+
+STANDARD = "ua-1"
+"""PDF/UA-1: tagged, titled, with alternative texts. (PDF/A would force a creation date into the file.)"""
+NAMED = 4
+
+
+def write_report(folders: Iterable[Path], out_pdf: Path) -> Path:
+    """Write one PDF of all results in ``folders``; the same results give the same bytes.
+
+    Raises BadInput for a folder without results, MissingExtra without typst or matplotlib.
+    """
+    pdf = report_bytes([Path(f) for f in folders])
+    out_pdf = Path(out_pdf)
+    out_pdf.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(suffix=".pdf", dir=out_pdf.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(pdf)
+        Path(temporary).chmod(0o644)
+        os.replace(temporary, out_pdf)
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+    return out_pdf
+
+
+def report_bytes(folders: list[Path]) -> bytes:
+    """The PDF of :func:`write_report` as bytes."""
+    return compile_report(folders, format="pdf", pdf_standards=[STANDARD])
+
+
+def compile_report(folders: list[Path], **options):
+    """What Typst makes of the report with the given output options (bytes, or a list of bytes for images)."""
+    typst = _typst()
+    from backdrive_bayes.report.sections import chapters
+
+    found = [c for folder in folders for c in chapters(folder)]
+    with tempfile.TemporaryDirectory() as name:
+        room = Path(name)
+        data, fonts = _fit_to_fonts(_data(found, room), typst)
+        (room / "data.json").write_text(json.dumps(data), encoding="utf-8")
+        template = files("backdrive_bayes.report").joinpath("template.typ").read_text(encoding="utf-8")
+        (room / "template.typ").write_text(template, encoding="utf-8")
+        return typst.compile(str(room / "template.typ"), root=str(room), **fonts, **options)
+
+
+def _typst():
+    try:
+        import typst
+    except ImportError:
+        raise MissingExtra("the PDF report", "typst", "report") from None
+    return typst
+
+
+def _data(found, room: Path) -> dict:
+    """Everything that the template prints; figures are written into ``room``."""
+    from backdrive_bayes.report.method_text import method_blocks
+
+    def placed(part):
+        return [[_placed(b.data(), c, i, room) for b in getattr(c, part)] for i, c in enumerate(found)]
+
+    names = [c.title for c in found]
+    shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+    title = free(f"Backdrivability report: {shown}", 160)
+    method = [b.data() for b in method_blocks()]
+    author = f"backdrive-bayes {version('backdrive-bayes')}"
+    return {"title": title, "running": title, "author": author, "summaries": placed("summary"), "details": [*placed("details"), method]}
+
+
+def _placed(block, chapter, i, room):
+    """A block with its figure's file."""
+    from backdrive_bayes.figures.catalogue import save_svg
+
+    if block["kind"] != "picture":
+        return block
+    path = room / f"{i}-{block['name']}.svg"
+    save_svg(chapter.figures[block["name"]], path)
+    return block | {"file": path.name}
+
+
+def _fit_to_fonts(data, typst):
+    """Printable data, and font options; fonts of the system are used only where the bundled ones lack a character."""
+    from backdrive_bayes.figures.fonts import font_folder, uncovered
+
+    text = "".join(set("".join(every_string(data))))
+    missing, system = uncovered(text), False
+    if missing:
+        have = [f.path for f in typst.Fonts(include_system_fonts=True).fonts() if f.path]
+        left = uncovered(text, have)
+        missing, system = left, left != missing
+    options = {"font_paths": [str(font_folder())], "ignore_system_fonts": not system}
+    return map_strings(lambda s: _line(s, frozenset(missing)), data), options
+
+
+def _line(text, missing):
+    shown = printable(text, missing)
+    return shown if isinstance(text, Free) else typeset(shown)

@@ -1,0 +1,23 @@
+"""The kinds of results a report knows: one line each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.report import fit_section
+from backdrive_bayes.report.blocks import Chapter
+
+SECTIONS = {"indicators.json": fit_section.chapter}
+"""Result file name → function that reads its folder and returns a chapter; chapters come in this order."""
+
+
+def chapters(folder: Path) -> list[Chapter]:
+    """The chapters of all results in a folder; BadInput where there is none."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise BadInput(folder, "a result folder", "no such folder")
+    found = [make(folder) for name, make in SECTIONS.items() if (folder / name).exists()]
+    if not found:
+        raise BadInput(folder, f"a result folder with {' or '.join(SECTIONS)}", "none of them")
+    return found

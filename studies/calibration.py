@@ -1,0 +1,157 @@
+"""Coverage and simulation-based calibration on units drawn from the prior.
+
+    python studies/calibration.py --units 120 --out reports/calibration
+
+Every unit's parameters are drawn from the prior, its records simulated with correlated and white angle noise and torque noise,
+and fitted with fresh seeds. Written: calibration.json (coverage of the 90 % intervals with binomial bounds, SBC ranks and the
+p-value of their uniformity) and ranks.png.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import json
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import binom, chisquare
+
+from backdrive_bayes.bench.known_truth import BenchNoise, simulate_unit
+from backdrive_bayes.indicators.loop import Loops, model_loops, torque_grid
+from backdrive_bayes.indicators.summary import core_indicators, monitored, reducer_loops
+from backdrive_bayes.inference.fit import fit
+from backdrive_bayes.inference.sampling import Settings
+from backdrive_bayes.model.parameter import Scale
+from backdrive_bayes.model.reducer import ReducerModel
+from backdrive_bayes.model.registry import BASELINE, members_named
+
+RATED = 0.1
+SCALE = Scale(RATED, 0.02)
+LOOPS = ((0.1, 0.05), (0.05, 0.05))
+K = 0.03
+RANKS = 99
+
+
+def one_unit(seed: int, budget: float = 60.0, noise_factor: float = 1.0) -> dict:
+    """Fit one simulated unit; ranks of the truth among thinned draws, whether 90 % intervals hold it, convergence."""
+    rng = np.random.default_rng([20261121, seed])
+    model = ReducerModel(members_named(BASELINE), SCALE)
+    shared = {p.name: p.scaled_prior(SCALE).from_normal(rng.normal()) for p in model.parameters if not p.per_record}
+    values = []
+    for _ in LOOPS:
+        own = {p.name: p.scaled_prior(SCALE).from_normal(rng.normal()) for p in model.parameters if p.per_record}
+        values.append(shared | own)
+    unit = simulate_unit(model, values, LOOPS, BenchNoise(), rng)
+    began = time.perf_counter()
+    posterior = fit(unit, seed=seed, scale=SCALE, settings=Settings(max_seconds=budget), quantities=monitored(K))
+    result = {"seed": seed, "converged": posterior.converged, "seconds": time.perf_counter() - began, "quantities": {}}
+    physical = posterior.problem.physical(posterior.z)
+    truths = [shared.get(c.parameter.name, None) if c.record is None else values[c.record][c.parameter.name]
+              for c in posterior.problem.coordinates]
+    for label, truth, draws in zip(posterior.problem.labels, truths, physical.T, strict=True):
+        result["quantities"][label] = place(truth, draws, noise_factor)
+    for r, v in enumerate(values):
+        true = true_indicators(model, v, LOOPS[r][0])
+        loops = reducer_loops(posterior.problem, posterior.discrepancy, posterior.z, posterior.weights, r, K)
+        for name, draws in core_indicators(loops, K * RATED).items():
+            result["quantities"][f"{name}[{r}]"] = place(true[name], draws, noise_factor)
+    result["discrepancy_rad"] = posterior.discrepancy.scale_rad
+    result["truth"] = {k: float(v) for k, v in shared.items()}
+    return result
+
+
+def true_indicators(model, values, amplitude) -> dict:
+    """Noise-free indicators of the settled loop."""
+    torque = torque_grid(amplitude, (K * RATED,))
+
+    class Known:
+        def __init__(self):
+            self.model = model
+
+        def values(self, z, record):
+            return {k: np.array([[v]]) for k, v in values.items()}
+
+    loops: Loops = model_loops(Known(), np.zeros((1, 1)), 0, torque)
+    return {k: float(v[0]) for k, v in core_indicators(loops, K * RATED).items()}
+
+
+def place(truth, draws, noise_factor=1.0):
+    """Rank of the truth among 99 thinned draws and whether the central 90 % interval holds it."""
+    draws = np.median(draws) + noise_factor * (draws - np.median(draws))
+    lo, hi = np.quantile(draws, [0.05, 0.95])
+    thin = draws[np.linspace(0, draws.size - 1, RANKS).astype(int)]
+    return {"rank": int((thin < truth).sum()), "covered": bool(lo <= truth <= hi), "z": float((truth - draws.mean()) / (draws.std() + 1e-300))}
+
+
+def summarise(results) -> dict:
+    """Coverage and rank uniformity per quantity over the converged units."""
+    good = [r for r in results if r["converged"]]
+    names = list(good[0]["quantities"])
+    n = len(good)
+    low, high = (int(v) for v in binom.interval(0.99, n, 0.9))
+    table = {}
+    for name in names:
+        hits = sum(r["quantities"][name]["covered"] for r in good)
+        counts = np.bincount([r["quantities"][name]["rank"] // 10 for r in good], minlength=10)
+        table[name] = {"covered": hits, "share": hits / n, "inside_99_bounds": low <= hits <= high,
+                       "rank_histogram": counts.tolist(), "rank_p_value": float(chisquare(counts).pvalue)}
+    return {"units": len(results), "converged": n, "binomial_99_bounds": [low, high], "quantities": table,
+            "median_seconds": float(np.median([r["seconds"] for r in results]))}
+
+
+def draw_ranks(summary, path):
+    """Rank histograms of every quantity with the 99 % band of a uniform."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    table = summary["quantities"]
+    columns = 6
+    rows = -(-len(table) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(2.3 * columns, 1.6 * rows), sharex=True, sharey=True)
+    lo, hi = binom.interval(0.99, summary["converged"], 0.1)
+    for axis in axes.ravel()[len(table):]:
+        axis.set_visible(False)
+    for axis, (name, row) in zip(axes.ravel(), table.items(), strict=False):
+        axis.axhspan(lo, hi, color="0.85")
+        axis.bar(np.arange(10) + 0.5, row["rank_histogram"], width=1, color="#0072B2", edgecolor="white")
+        axis.set_title(f"{name.replace('_', ' ')}\n{row['share']:.0%} covered", fontsize=8)
+        axis.tick_params(labelsize=8)
+    figure.supxlabel("rank of the truth among 99 draws, in tenths (grey: 99 % band of a calibrated posterior)", fontsize=9)
+    figure.supylabel("units", fontsize=9)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def main():
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--units", type=int, default=120)
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("reports/calibration"))
+    options = parser.parse_args()
+    seeds = range(options.first_seed, options.first_seed + options.units)
+    with ProcessPoolExecutor(options.workers) as pool:
+        results = []
+        for result in pool.map(one_unit, seeds):
+            results.append(result)
+            bad = [k for k, v in result["quantities"].items() if abs(v["z"]) > 3.5]
+            print(f"unit {result['seed']}: converged {result['converged']}, {result['seconds']:.1f} s, far off: {bad}", flush=True)
+    summary = summarise(results)
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / "calibration.json").write_text(json.dumps(summary | {"runs": results}, indent=1))
+    draw_ranks(summary, options.out / "ranks.png")
+    for name, row in summary["quantities"].items():
+        print(f"{name:32s} {row['share']:.3f} {'' if row['inside_99_bounds'] else 'OUTSIDE'} p={row['rank_p_value']:.3f}")
+
+
+if __name__ == "__main__":
+    main()

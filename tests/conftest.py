@@ -1,0 +1,59 @@
+"""Small virtual records and unit folders for the tests of reading, checking and the command line."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SHARED = Path(__file__).resolve().parents[1] / ".." / "shared"
+FULL_CYCLE = (0.0, 1.0, -1.0, 1.0)
+
+
+def ramps(knots=FULL_CYCLE, *, rate=1.0, hertz=200.0, dwell=0.0, limit=np.inf, noise=0.0, seed=0):
+    """Time and torque of straight ramps between ``knots``, resting ``dwell`` seconds at each."""
+    times, levels = [0.0], [knots[0]]
+    for before, after in zip(knots[:-1], knots[1:], strict=True):
+        times += [times[-1] + abs(after - before) / rate, times[-1] + abs(after - before) / rate + dwell]
+        levels += [after, after]
+    time = np.arange(0.0, times[-1] + 0.5 / hertz, 1.0 / hertz)
+    torque = np.clip(np.interp(time, times, levels), -limit, limit)
+    return time, torque + noise * np.random.default_rng(seed).normal(size=len(time))
+
+
+def answer(torque, *, gap=0.2, compliance=0.01, clearance=0.02):
+    """Angle of a clearance crossed at drag ``gap``, in series with a soft spring: curved and hysteretic."""
+    play, position = np.empty_like(torque), 0.0
+    for k, level in enumerate(torque):
+        position = min(max(position, level - gap), level + gap)
+        play[k] = position
+    return compliance * torque + clearance * np.tanh(play / 0.1)
+
+
+def write_csv(path, time, torque, angle, header="time_s,torque_Nm,angle_arcmin"):
+    rows = "\n".join(f"{t:.6f},{q:.6f},{a:.6f}" for t, q, a in zip(time, torque, angle, strict=True))
+    data = f"{header}\n{rows}\n".encode()
+    path.write_bytes(gzip.compress(data) if path.name.endswith(".gz") else data)
+    return path
+
+
+@pytest.fixture
+def unit_folder(tmp_path):
+    """A valid unit of one record; tests spoil one thing of it."""
+    folder = tmp_path / "unit"
+    folder.mkdir()
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) * 10800 / np.pi + 0.1 * np.random.default_rng(1).normal(size=len(time))
+    write_csv(folder / "a.csv", time, torque, angle)
+    (folder / "unit.toml").write_text(
+        'schema = "backdrive-bayes/unit/1"\nname = "u"\nrated_torque_Nm = 1.0\n\n[[record]]\nfile = "a.csv"\n'
+    )
+    return folder
+
+
+@pytest.fixture(scope="session")
+def shared_data():
+    folder = SHARED / "data"
+    if not folder.is_dir():
+        pytest.skip("the shared bench data are not on this machine")
+    return folder.resolve()
