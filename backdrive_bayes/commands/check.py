@@ -44,8 +44,9 @@ def _extent(record: dict) -> str:
     amplitude = record["amplitude_Nm"]["estimated"]
     rate = record["loading_rate_Nm_per_s"]["estimated"]
     cycles = record["cycles"]
-    size = f"{record['samples']} samples in {record['duration_s']:.4g} s, ±{amplitude:.4g} N·m at {rate:.4g} N·m/s"
-    return f"{size}, {len(record['branches'])} branches, {cycles} cycle{'s'[: cycles != 1]}"
+    size = f"{record['samples']} samples in {record['duration_s']:.4g} s"
+    torque = f"±{amplitude:.4g} N·m at {rate:.4g} N·m/s"
+    return f"{size}, {torque}, {len(record['branches'])} branches, {cycles} cycle{'s'[: cycles != 1]}"
 
 
 def _levels(noise: dict) -> str:

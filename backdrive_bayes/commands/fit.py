@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.commands.output import progress, say, write_folder, write_json
-from backdrive_bayes.errors import BadInput
+from backdrive_bayes.commands.output import default_out, progress, say, write_folder, write_json
+from backdrive_bayes.errors import BadInput, MissingExtra
 
+ARCMIN = 10800.0 / 3.141592653589793
 HELP = "infer a unit's parameters and indicators, with credible intervals"
 
 
@@ -45,8 +46,49 @@ def run(args) -> int:
     result = indicators_json(posterior, args.k, args.level)
     for record, own in zip(result["records"], unit.records, strict=True):
         record["least_squares"] = least_squares_json(own, unit.rated_torque_nm, args.k)
-    with write_folder(args.out or Path(f"{unit.name}-fit")) as folder:
+    result["identity"] = dict(unit.identity)
+    result["notes"] = [*unit.notes, *(f"{r.name}: {note}" for r in unit.records for note in r.notes)]
+    out = args.out or default_out(unit.name, "fit")
+    with write_folder(out) as folder:
         write_json(folder / "indicators.json", result)
         write_posterior(posterior, folder / "posterior.nc")
-    _summarise(result)
+        if not args.no_figures:
+            _draw(folder)
+    _summarise(result, out)
     return 0 if posterior.converged else 4
+
+
+def _draw(folder: Path) -> None:
+    try:
+        from backdrive_bayes.figures.catalogue import save_figures
+    except MissingExtra as missing:
+        say(f"no figures: {missing}")
+    else:
+        save_figures(folder, folder / "figures")
+
+
+def _summarise(result: dict, out: Path) -> None:
+    convergence = result["convergence"]
+    if not convergence["converged"]:
+        say(f"{result['unit']}: INCONCLUSIVE, {convergence['advice']}")
+        say(f"  worst: {convergence['worst']}; R-hat {convergence['max_rhat']:.3f}, ESS {convergence['min_bulk_ess']:.0f}")
+    else:
+        say(f"{result['unit']}: converged in {convergence['seconds']:.1f} s; median [{result['level']:.0%} interval]")
+        for record in result["records"]:
+            say(f"  {record['file']}: " + ", ".join(_shown(record["indicators"], result["k"])))
+    say(f"written to {out}")
+
+
+def _shown(indicators: dict, k: float):
+    names = (
+        ("lost_motion_rad", f"δ({k:g}T_r)", ARCMIN, "′"),
+        ("zero_torque_width_rad", "w(0)", ARCMIN, "′"),
+        ("peak_angle_rad", "peak", ARCMIN, "′"),
+        ("loop_area_J", "S", 1e3, " mJ"),
+        ("dissipation_ratio", "u", 1.0, ""),
+    )
+    for key, symbol, factor, unit in names:
+        value = indicators[key]
+        if value is not None:
+            median, lo, hi = (value[part] * factor for part in ("median", "lo", "hi"))
+            yield f"{symbol} = {median:.4g} [{lo:.4g}, {hi:.4g}]{unit}"

@@ -11,7 +11,11 @@ NAME = "report.pdf"
 def add_arguments(parser) -> None:
     """Options of this verb."""
     parser.add_argument(
-        "results", type=Path, nargs="+", metavar="OUT", help="result folders; the PDF goes into the first unless -o says where"
+        "results",
+        type=Path,
+        nargs="+",
+        metavar="OUT",
+        help="result folders; the PDF goes into the first unless -o says where",
     )
 
 

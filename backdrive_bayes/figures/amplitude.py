@@ -8,8 +8,8 @@ from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import MJ_PER_J, SERIES, few_ticks, new_figure, record_labels, styled
 
 CAPTION = (
-    "Energy S(t) dissipated in a loop of amplitude t and dissipation ratio u(t) = S/W_abs: median and interval. Below the measured "
-    "amplitude these are the model's predictions."
+    "Energy S(t) dissipated in a loop of amplitude t and dissipation ratio u(t) = S/W_abs: median and "
+    "interval. Below the measured amplitude these are the model's predictions."
 )
 PANELS = (("loop_area_J", MJ_PER_J, "S(t) [mJ]"), ("dissipation_ratio", 1.0, "u(t) [–]"))
 
@@ -33,9 +33,21 @@ def draw(saved: Saved, records: list[int]):
 
 def _series(panel, record, key, factor, label, place, count):
     amplitude = np.asarray(record["by_amplitude"]["amplitude_Nm"])
-    median, lo, hi = (factor * np.array([v[k] if v else np.nan for v in record["by_amplitude"][key]]) for k in ("median", "lo", "hi"))
+    median, lo, hi = (
+        factor * np.array([v[k] if v else np.nan for v in record["by_amplitude"][key]])
+        for k in ("median", "lo", "hi")
+    )
     # A small sideways step keeps the bars of several records apart.
     aside = (place - 0.5 * (count - 1)) * 0.12 * (amplitude[0] if amplitude.size else 0.0)
     error = np.maximum([median - lo, hi - median], 0.0)
     look = SERIES[place % len(SERIES)]
-    panel.errorbar(amplitude + aside, median, error, **look, label=label, capsize=2, markersize=4, markerfacecolor="white")
+    panel.errorbar(
+        amplitude + aside,
+        median,
+        error,
+        **look,
+        label=label,
+        capsize=2,
+        markersize=4,
+        markerfacecolor="white",
+    )

@@ -50,7 +50,7 @@ def _split(name, draw, saved, records, at_most):
 
 
 def save_figures(folder: Path, out: Path) -> list[Path]:
-    """Write every figure of ``folder`` into ``out`` as .svg and .png; the same results give the same bytes."""
+    """Write every figure of ``folder`` into ``out`` as .svg and .png; equal results give equal bytes."""
     out.mkdir(parents=True, exist_ok=True)
     written = []
     for name, figure in all_figures(folder).items():

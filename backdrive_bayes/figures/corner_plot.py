@@ -11,8 +11,8 @@ from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import BLUE, MaxNLocator, display_unit, new_figure, styled, words
 
 CAPTION = (
-    "Posterior of the parameters that all records share: marginal histograms and pairwise contours that hold 39 % and 86 % of the "
-    "draws (one and two standard deviations of a normal)."
+    "Posterior of the parameters that all records share: marginal histograms and pairwise contours that "
+    "hold 39 % and 86 % of the draws (one and two standard deviations of a normal)."
 )
 MOST = 12
 LEVELS = (0.393, 0.865)
@@ -21,7 +21,9 @@ LABEL_IN = 0.45
 
 
 def shared_parameters(saved: Saved) -> dict[str, tuple[np.ndarray, str]]:
-    """Draws (chains, draws) and unit for display of each parameter that belongs to no single record, at most twelve."""
+    """Draws (chains, draws) and unit for display of each parameter that belongs to no single record, at most
+    twelve.
+    """
     posterior, out = saved.group("posterior"), {}
     for name, about in saved.indicators["parameters"].items():
         if name in posterior and posterior[name].dims == ("chain", "draw") and len(out) < MOST:
@@ -91,7 +93,9 @@ def _dress(axes, shown, label_at):
             panel.tick_params(axis="y", labelrotation=0)
             panel.set_xticks(_inner_ticks(*panel.get_xlim()))
             for label in (*panel.get_xticklabels(), *panel.get_yticklabels()):
-                label.set(ha="right" if label in panel.get_yticklabels() else "center", rotation_mode="default")
+                label.set(
+                    ha="right" if label in panel.get_yticklabels() else "center", rotation_mode="default"
+                )
             if j < i:
                 panel.set_yticks(_inner_ticks(*panel.get_ylim()))
 

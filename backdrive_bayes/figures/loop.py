@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.saved import Saved, record_blocks
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, FALLING, FIRST, GREY, RISING, few_ticks, new_figure, record_labels, styled
+from backdrive_bayes.figures.style import (
+    ARCMIN_PER_RAD,
+    FALLING,
+    FIRST,
+    GREY,
+    RISING,
+    few_ticks,
+    new_figure,
+    record_labels,
+    styled,
+)
 
 CAPTION = (
-    "Measured angle against torque (block means, encoder offset removed) with the reducer's settled loop: median and interval. "
-    "Beneath: measured minus predicted angle; grey bars span the interval of replicated data."
+    "Measured angle against torque (block means, encoder offset removed) with the reducer's settled loop: "
+    "median and interval. Beneath: measured minus predicted angle; grey bars span the interval of "
+    "replicated data."
 )
 _STEPS = {1: 10, 2: 6, 3: 5}
 
@@ -16,20 +27,21 @@ def draw(saved: Saved, records: list[int]):
     """Loops of the given records in columns, angle [arcmin] over torque [N·m], residual strips beneath."""
     with styled():
         figure = new_figure(3.7)
+        ratios = [3, 1.15] if saved.posterior_file else [1]
         axes = figure.subplots(
-            2, len(records), sharex="col", sharey="row", squeeze=False, gridspec_kw={"height_ratios": [3, 1.15]}
+            len(ratios), len(records), sharex="col", sharey="row", squeeze=False, height_ratios=ratios
         )
         labels = record_labels(saved.records)
         for column, record in enumerate(records):
             _loop(axes[0, column], saved, record)
             axes[0, column].set_title(labels[record])
-            axes[1, column].set_xlabel("torque [N·m]")
+            axes[-1, column].set_xlabel("torque [N·m]")
             few_ticks(axes[0, column], _STEPS[len(records)])
-            few_ticks(axes[1, column], _STEPS[len(records)], 4)
             if saved.posterior_file:
+                few_ticks(axes[1, column], _STEPS[len(records)], 4)
                 _residual(axes[1, column], saved, record)
+                axes[1, 0].set_ylabel("residual\n[arcmin]")
         axes[0, 0].set_ylabel("angle [arcmin]")
-        axes[1, 0].set_ylabel("residual [arcmin]")
         figure.align_ylabels(axes[:, 0])
         handles, names = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=3, markerscale=1.8)
@@ -53,11 +65,17 @@ def _loop(axes, saved, record):
         blocks = record_blocks(saved, record)
         for name, mask, colour, marker in _kinds(blocks):
             if mask.any():
-                _points(axes, blocks.torque_nm[mask], blocks.angle_rad[mask], colour, marker, f"measured, {name}")
+                _points(
+                    axes, blocks.torque_nm[mask], blocks.angle_rad[mask], colour, marker, f"measured, {name}"
+                )
     for key, look, name in (("rising_rad", RISING, "rising"), ("falling_rad", FALLING, "falling")):
         band = {k: [v * ARCMIN_PER_RAD for v in values] for k, values in loop[key].items()}
-        axes.fill_between(loop["torque_Nm"], band["lo"], band["hi"], color=look["color"], alpha=0.3, linewidth=0)
-        axes.plot(loop["torque_Nm"], band["median"], **look, label=f"settled loop, {name} ({100 * level:.3g} %)")
+        axes.fill_between(
+            loop["torque_Nm"], band["lo"], band["hi"], color=look["color"], alpha=0.3, linewidth=0
+        )
+        axes.plot(
+            loop["torque_Nm"], band["median"], **look, label=f"settled loop, {name} ({100 * level:.3g} %)"
+        )
 
 
 def _residual(axes, saved, record):

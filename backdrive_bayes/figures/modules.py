@@ -5,11 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, FALLING, RISING, few_ticks, new_figure, record_labels, styled, words
+from backdrive_bayes.figures.style import (
+    ARCMIN_PER_RAD,
+    FALLING,
+    RISING,
+    few_ticks,
+    new_figure,
+    record_labels,
+    styled,
+    words,
+)
 
 CAPTION = (
-    "The settled loop as the sum of its modules (median curves) and of the model error, which is the loop minus the sum of the "
-    "modules. Panels share the loop's angle scale unless they say otherwise."
+    "The settled loop as the sum of its modules (median curves) and of the model error, which is the loop "
+    "minus the sum of the modules. Panels share the loop's angle scale unless they say otherwise."
 )
 COLUMNS = 3
 LEGIBLE = 0.1
@@ -28,17 +37,23 @@ def distinct(saved: Saved) -> list[int]:
 
 
 def _alike(a, b):
-    if a["modules"].keys() != b["modules"].keys() or len(a["loop"]["torque_Nm"]) != len(b["loop"]["torque_Nm"]):
+    if a["modules"].keys() != b["modules"].keys() or len(a["loop"]["torque_Nm"]) != len(
+        b["loop"]["torque_Nm"]
+    ):
         return False
     pairs = [(a["loop"]["torque_Nm"], b["loop"]["torque_Nm"])]
-    pairs += [(a["modules"][m][k], b["modules"][m][k]) for m in a["modules"] for k in ("rising_rad", "falling_rad")]
+    pairs += [
+        (a["modules"][m][k], b["modules"][m][k]) for m in a["modules"] for k in ("rising_rad", "falling_rad")
+    ]
     top = max(np.abs(a["loop"]["rising_rad"]["median"]))
     scales = [max(np.abs(a["loop"]["torque_Nm"])), *[top] * (len(pairs) - 1)]
     return all(np.abs(np.subtract(x, y)).max() < ALIKE * s for (x, y), s in zip(pairs, scales, strict=True))
 
 
 def draw(saved: Saved, records: list[int]):
-    """Panels for the loop, each module and the model error of the first of ``records``, angle [arcmin] over torque [N·m]."""
+    """Panels for the loop, each module and the model error of the first of ``records``, angle [arcmin] over
+    torque [N·m].
+    """
     record = saved.records[records[0]]
     curves = _curves(record)
     rows = -(-len(curves) // COLUMNS)
@@ -61,7 +76,9 @@ def draw(saved: Saved, records: list[int]):
 
 def _curves(record):
     loop = [np.asarray(record["loop"][k]["median"]) for k in ("rising_rad", "falling_rad")]
-    modules = {m: [np.asarray(c[k]) for k in ("rising_rad", "falling_rad")] for m, c in record["modules"].items()}
+    modules = {
+        m: [np.asarray(c[k]) for k in ("rising_rad", "falling_rad")] for m, c in record["modules"].items()
+    }
     rest = [whole - sum(parts[i] for parts in modules.values()) for i, whole in enumerate(loop)]
     return [("settled loop", *loop), *((words(m), *c) for m, c in modules.items()), ("model error", *rest)]
 

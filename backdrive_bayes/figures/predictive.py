@@ -5,18 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.figures.saved import Saved, record_blocks
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, BLACK, BLUE, GREY, few_ticks, new_figure, record_labels, styled
+from backdrive_bayes.figures.style import (
+    ARCMIN_PER_RAD,
+    BLACK,
+    BLUE,
+    GREY,
+    few_ticks,
+    new_figure,
+    record_labels,
+    styled,
+)
 
 CAPTION = (
-    "Posterior predictive check. Left: distribution of the measured blocks' ranks among replicated blocks, as difference from an "
-    "even spread; the band holds the same curve of the replicates themselves. Middle and right: two summaries of the measured "
-    "record (line) among those of the replicates (histogram); the rms step of the residual from block to block tests the noise level."
+    "Posterior predictive check. Left: distribution of the measured blocks' ranks among replicated blocks, "
+    "as difference from an even spread; the band holds the same curve of the replicates themselves. Middle "
+    "and right: two summaries of the measured record (line) among those of the replicates (histogram); the "
+    "rms step of the residual from block to block tests the noise level."
 )
 POINTS = 101
 
 
 def draw(saved: Saved, records: list[int]):
-    """One row a record: rank distribution, angle range and rms step between neighbouring residuals [arcmin]."""
+    """One row a record: rank distribution, angle range and rms step of the residual [arcmin]."""
     with styled():
         figure = new_figure(0.7 + 1.1 * len(records))
         axes = figure.subplots(len(records), 3, squeeze=False)
@@ -24,7 +34,7 @@ def draw(saved: Saved, records: list[int]):
         for row, record in zip(axes, records, strict=True):
             blocks = record_blocks(saved, record)
             _ecdf(row[0], blocks, saved.indicators["level"])
-            row[0].set_ylabel(f"{labels[record]}\nΔ share of blocks")
+            row[0].set_ylabel(f"{labels[record]}\nΔ share")
             replicates = blocks.replicates_rad
             _summary(row[1], np.ptp(replicates, axis=1), np.ptp(blocks.angle_rad))
             _summary(row[2], _roughness(replicates, blocks), _roughness(blocks.angle_rad, blocks))
@@ -48,7 +58,9 @@ def _ecdf(panel, blocks, level):
     measured = _curve(_rank(replicates, blocks.angle_rad), grid)
     band = np.array([_curve(_rank(replicates, r), grid) for r in blocks.replicates_rad])
     lo, hi = np.quantile(band, [0.5 - level / 2, 0.5 + level / 2], axis=0)
-    panel.fill_between(grid, lo, hi, color=GREY, alpha=0.4, linewidth=0, label=f"ranks of replicates, {100 * level:.3g} %")
+    panel.fill_between(
+        grid, lo, hi, color=GREY, alpha=0.4, linewidth=0, label=f"ranks of replicates, {100 * level:.3g} %"
+    )
     panel.plot(grid, measured, color=BLUE, label="ranks of measured")
     panel.axhline(0, color=BLACK, linewidth=0.6)
     panel.set_xlim(0, 1)
@@ -71,7 +83,12 @@ def _roughness(angle, blocks):
 
 def _summary(panel, replicated, measured):
     panel.hist(
-        replicated * ARCMIN_PER_RAD, bins=20, color="#C9C9C9", edgecolor="#7A7A7A", linewidth=0.4, label="replicates"
+        replicated * ARCMIN_PER_RAD,
+        bins=20,
+        color="#C9C9C9",
+        edgecolor="#7A7A7A",
+        linewidth=0.4,
+        label="replicates",
     )
     panel.axvline(measured * ARCMIN_PER_RAD, color=BLUE, linewidth=1.6, label="measured record")
     few_ticks(panel, 3)

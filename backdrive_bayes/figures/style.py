@@ -19,7 +19,9 @@ except ImportError:
     raise MissingExtra("drawing figures", "matplotlib", "figures") from None
 
 WIDTH_IN = 170 / 25.4
-"""Width of every figure: the text width of an A4 page with 20 mm margins, so that font sizes print as they are set."""
+"""Width of every figure: the text width of an A4 page with 20 mm margins, so that font sizes print as they
+are set.
+"""
 
 ARCMIN_PER_RAD = 180 * 60 / math.pi
 MJ_PER_J = 1e3
@@ -61,7 +63,7 @@ _RC = {
     "axes.formatter.limits": (-4, 5),
     "axes.unicode_minus": True,
     "text.parse_math": False,
-    # Text stays text, so that it can be selected and found in the PDF; the hash salt makes element ids repeatable.
+    # Text stays text, so that it can be found in the PDF; the hash salt makes element ids repeatable.
     "svg.fonttype": "none",
     "svg.hashsalt": "backdrive_bayes",
 }
@@ -90,7 +92,9 @@ def few_ticks(axes, x: int = 4, y: int = 5) -> None:
 
 
 def record_labels(records) -> list[str]:
-    """A short, unique name for each record object: its rate, with the amplitude or a number where rates repeat."""
+    """A short, unique name for each record object: its rate, with the amplitude or a number where rates
+    repeat.
+    """
     labels = [f"{r['loading_rate_Nm_per_s']:.2g} N·m/s" for r in records]
     if len(set(labels)) < len(labels):
         labels = [f"{a}, ±{r['amplitude_Nm']:.2g} N·m" for a, r in zip(labels, records, strict=True)]

@@ -8,8 +8,8 @@ from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import BLACK, BLUE, MJ_PER_J, few_ticks, new_figure, record_labels, styled
 
 CAPTION = (
-    "Torque–energy curve: energy dissipated per unit of torque, median and interval, with the ranges W1 (|τ| ≤ τ₁), "
-    "W2 (τ₁ < |τ| ≤ τ₂) and W3 (beyond τ₂)."
+    "Torque–energy curve: energy dissipated per unit of torque, median and interval, with the ranges W1 "
+    "(|τ| ≤ τ₁), W2 (τ₁ < |τ| ≤ τ₂) and W3 (beyond τ₂)."
 )
 ZOOM_BELOW = 0.25
 """Where τ₂ lies below this share of the amplitude, a second row shows the low torques enlarged."""
@@ -49,9 +49,13 @@ def _curve(axes, saved, record, zoomed):
     lo, hi, median = (np.asarray(curve[k]) * MJ_PER_J for k in ("lo", "hi", "median_J_per_Nm"))
     edges = (0.0, tau1, tau2, end)
     for (name, colour, hatch), a, b in zip(SHADES, edges, edges[1:], strict=False):
-        axes.axvspan(a, b, facecolor=colour, hatch=hatch, edgecolor="white", linewidth=0, alpha=0.8, label=name)
+        axes.axvspan(
+            a, b, facecolor=colour, hatch=hatch, edgecolor="white", linewidth=0, alpha=0.8, label=name
+        )
     axes.fill_between(torque, lo, hi, color=BLUE, alpha=0.4, linewidth=0)
-    axes.plot(torque, median, color=BLUE, label=f"median and {100 * saved.indicators['level']:.3g} % interval")
+    axes.plot(
+        torque, median, color=BLUE, label=f"median and {100 * saved.indicators['level']:.3g} % interval"
+    )
     axes.axvline(tau1, color=BLACK, linestyle=(0, (1, 1.2)), linewidth=1, label="τ₁")
     axes.axvline(tau2, color=BLACK, linestyle=(0, (5, 2)), linewidth=1, label="τ₂")
     axes.set_xlim(0, min(end, ZOOM_TAU2 * tau2) if zoomed else end)

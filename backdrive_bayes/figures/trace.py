@@ -9,8 +9,9 @@ from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import GREY, SERIES, few_ticks, new_figure, styled, words
 
 CAPTION = (
-    "Sampling. Rank histograms: ranks of each ensemble's draws among all draws, as counts over the even share; ensembles that "
-    "agree stay near 1. Below: log posterior of the kept draws of each ensemble, walker after walker."
+    "Sampling. Rank histograms: ranks of each ensemble's draws among all draws, as counts over the even "
+    "share; ensembles that agree stay near 1. Below: log posterior of the kept draws of each ensemble, "
+    "walker after walker."
 )
 BINS = 16
 COLUMNS = 6
@@ -46,7 +47,14 @@ def _ranks(panel, values):
     for chain, own in enumerate(share):
         counts, edges = np.histogram(own, bins=BINS, range=(0, 1))
         look = SERIES[chain % len(SERIES)]
-        panel.stairs(counts * BINS / own.size, edges, color=look["color"], linestyle=look["linestyle"], linewidth=1, baseline=None)
+        panel.stairs(
+            counts * BINS / own.size,
+            edges,
+            color=look["color"],
+            linestyle=look["linestyle"],
+            linewidth=1,
+            baseline=None,
+        )
     few_ticks(panel, 2, 2)
 
 

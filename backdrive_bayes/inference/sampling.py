@@ -15,7 +15,7 @@ from emcee.moves import DEMove, Move
 from backdrive_bayes.inference.proposal import StudentMixture, effective_share, fit_mixture, importance, temper
 
 PARTS = (1, 4)
-WORTHWHILE = 1.3
+WORTHWHILE = 1.5
 """By how much a refitted proposal must be better for the draws made so far to be given up."""
 
 
@@ -51,7 +51,7 @@ class Settings:
     walkers: int = 64
     block: int = 60
     warm_up_blocks: int = 10
-    refits: int = 8
+    refits: int = 3
     kept_per_ensemble: int = 1000
     max_seconds: float = 120.0
     good_share: float = 0.15

@@ -64,6 +64,7 @@ def check_record(record: Record, rated_torque_nm: float) -> dict:
         "frozen": {"torque": longest_frozen(torque, angle), "angle": longest_frozen(angle, torque)},
         "angle_quantum_rad": quantum(angle),
         "angle_range_rad": float(np.ptp(angle)),
+        "angle_signal_rad": _signal(angle),
         "branches": [_branch(branch, torque) for branch in branches],
         "cycles": int(cycle_count(torque, segments) + 0.05),
         "torque_range_Nm": [low, high],
@@ -84,6 +85,11 @@ def _sampling(time: np.ndarray) -> dict:
     step = float(np.median(steps))
     irregularity = float(np.percentile(np.abs(steps - step), 90) / step)
     return {"rate_hz": 1.0 / step, "irregularity": irregularity, "regular": irregularity < 0.05}
+
+
+def _signal(angle: np.ndarray) -> float:
+    """Range of the means of fifty blocks: what the angle moves apart from its noise."""
+    return float(np.ptp([block.mean() for block in np.array_split(angle, min(50, len(angle)))]))
 
 
 def _branch(branch, torque: np.ndarray) -> dict:

@@ -105,10 +105,10 @@ def _size(found, _):
             "warning", f"torque runs from {low:.4g} to {high:.4g} N·m: off centre by {centre:.2g} N·m"
         )
     noise = math.hypot(found["noise"]["white_rad"], found["noise"]["correlated_rad"])
-    if found["angle_range_rad"] < 5.0 * noise:
+    if found["angle_signal_rad"] < 2.0 * noise:
         yield _message(
             "error",
-            f"angle moves {found['angle_range_rad'] * _ARCMIN:.3g}′ only, "
+            f"angle moves {found['angle_signal_rad'] * _ARCMIN:.3g}′ only, "
             f"not clear of its noise of {noise * _ARCMIN:.2g}′",
         )
 

@@ -70,8 +70,7 @@ def refine_turning_point(time_s: np.ndarray, torque_nm: np.ndarray, left: int, t
         return middle
     rising, falling = _line(time[start:stop], height[start:stop]), _line(time[begin:end], height[begin:end])
     meeting = _intersection(rising, falling, time[turn])
-    first, last = stop - 1 - (stop - start) // 10, min(begin + (end - begin) // 10, len(time) - 1)
-    if meeting is None or not time[first] <= meeting <= time[last]:
+    if meeting is None or not time[stop - 1] <= meeting <= time[begin]:
         return middle
     if _value(rising, meeting) > _percentile(height[stop - 1 : begin + 1], 90) + 0.1 * np.ptp(height):
         return middle

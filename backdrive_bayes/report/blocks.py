@@ -62,7 +62,9 @@ class Facts(Block):
 
 @dataclass(frozen=True)
 class Table(Block):
-    """Rows under column names; a cell of two texts has the second one small beneath; ``widths`` in shares (0: as wide as needed)."""
+    """Rows under column names; a cell of two texts has the second one small beneath; ``widths`` in shares (0:
+    as wide as needed).
+    """
 
     kind = "table"
     columns: list[str]
@@ -72,11 +74,17 @@ class Table(Block):
 
 @dataclass(frozen=True)
 class Picture(Block):
-    """A figure by name, with its caption (which is also its alternative text)."""
+    """A figure by name, with its caption, which is also its alternative text.
+
+    One that ``floats`` lets the text behind it go first; one that is ``spilt`` is shown only where its summary
+    had no room for it.
+    """
 
     kind = "picture"
     name: str
     caption: str
+    floats: bool = False
+    spilt: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,18 @@ from backdrive_bayes.figures.catalogue import caption, figures_of
 from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import PER_FIGURE, display_unit, record_labels, words
 from backdrive_bayes.report import fit_tables as tables
-from backdrive_bayes.report.blocks import Banner, Block, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature
+from backdrive_bayes.report.blocks import (
+    Banner,
+    Block,
+    Chapter,
+    Facts,
+    Heading,
+    Note,
+    Paragraph,
+    Picture,
+    Signature,
+)
+from backdrive_bayes.report.classic_tables import least_squares
 from backdrive_bayes.report.numbers import interval_text, level_text, prior_text
 from backdrive_bayes.report.text import free
 
@@ -33,7 +44,7 @@ def chapter(folder: Path) -> Chapter:
             *[Picture(name, caption(name)) for name in shown],
             Signature(["Reviewed by", "Date", "Signature"]),
         ],
-        _details(saved, rest),
+        [*(Picture(name, caption(name), spilt=True) for name in shown), *_details(saved, rest)],
         figures,
     )
 
@@ -41,30 +52,40 @@ def chapter(folder: Path) -> Chapter:
 def _verdict(saved):
     found = saved.indicators["convergence"]
     numbers = (
-        f"Largest R-hat {found['max_rhat']:.3f}; smallest effective sample size {found['min_bulk_ess']:.0f} (bulk) and "
-        f"{found['min_tail_ess']:.0f} (tail)."
+        f"Largest R-hat {found['max_rhat']:.3f}; smallest effective sample size {found['min_bulk_ess']:.0f} "
+        f"(bulk) and {found['min_tail_ess']:.0f} (tail)."
     )
     if found["converged"]:
         return Banner("good", "CONVERGED: the intervals may be used", numbers)
-    advice = found.get("advice") or "Sample longer and report again."
-    return Banner("bad", "INCONCLUSIVE: the sampling has not converged", f"Do not use these intervals. {advice} {numbers}")
+    advice = (found.get("advice") or "sample longer and report again").rstrip(".")
+    text = f"Do not use these intervals. Advice: {advice}. {numbers}"
+    return Banner("bad", "INCONCLUSIVE: the sampling has not converged", text)
 
 
 def _identity(saved):
     about, attributes, records = saved.indicators, saved.attributes(), saved.records
     identity = dict(about.get("identity") or {})
     credit = [(key.capitalize(), free(identity.pop(key))) for key in ("credit", "license") if key in identity]
-    rows = [("Unit", free(about["unit"])), *((free(words(k).capitalize(), 40), free(v)) for k, v in identity.items())]
+    rows = [
+        ("Unit", free(about["unit"])),
+        *((free(words(k).capitalize(), 40), free(v)) for k, v in identity.items()),
+    ]
     if "rated_torque_nm" in attributes:
         rows.append(("Rated torque", f"{attributes['rated_torque_nm']:g} N·m"))
     rows += [
-        ("Records", f"{len(records)}: loading rates {', '.join(record_labels(records))}"),
+        ("Records", _record_list(records)),
         ("Model", " + ".join(words(m) for m in [*about["model"]["modules"], *about["model"]["effects"]])),
         ("Intervals", f"central {level_text(about['level'])} credible intervals, written median [low, high]"),
     ]
     if attributes.get("data_sha256"):
         rows.append(("Data, SHA-256", attributes["data_sha256"]))
     return Facts(rows + credit)
+
+
+def _record_list(records):
+    labels = record_labels(records)
+    more = f"; and {len(labels) - ON_SUMMARY} more" if len(labels) > ON_SUMMARY else ""
+    return f"{len(labels)}, loaded at {'; '.join(labels[:ON_SUMMARY])}{more}"
 
 
 def _details(saved, figures) -> list[Block]:
@@ -86,14 +107,14 @@ def _details(saved, figures) -> list[Block]:
         Heading("Loops of smaller amplitude"),
         *pictures("amplitude"),
         *tables.by_amplitude(saved),
-        *_parameters(saved),
-        *tables.noise(saved),
-        *tables.least_squares(saved),
         Heading("Diagnostics"),
         *tables.convergence(saved),
         *pictures("trace"),
         *pictures("predictive"),
-        *pictures("corner"),
+        *(Picture(p.name, p.caption, floats=True) for p in pictures("corner")),
+        *_parameters(saved),
+        *tables.noise(saved),
+        *least_squares(saved),
         *_reproduction(saved),
     ]
 
@@ -102,7 +123,14 @@ def _parameters(saved):
     rows = []
     for name, about in saved.indicators["parameters"].items():
         factor, unit = display_unit(about["unit"])
-        rows.append([tables.quantity_name(saved, name), interval_text(about, factor), unit or "–", prior_text(about["prior"], factor)])
+        rows.append(
+            [
+                tables.quantity_name(saved, name),
+                interval_text(about, factor),
+                unit or "–",
+                prior_text(about["prior"], factor),
+            ]
+        )
     return [
         Heading("Parameters and priors"),
         tables.parameter_table(rows, saved.indicators["level"]),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, record_labels, words
-from backdrive_bayes.report.blocks import Heading, Note, Paragraph, Table
-from backdrive_bayes.report.numbers import interval_text, level_text, like_interval, percent, significant
+from backdrive_bayes.report.blocks import Heading, Note, Table
+from backdrive_bayes.report.numbers import interval_text, level_text, percent, significant
 from backdrive_bayes.report.text import free
 
 INDICATORS = (
@@ -19,7 +19,9 @@ INDICATORS = (
 
 
 def indicators(saved, at_most: int | None = None) -> list:
-    """Tables of the indicators with the share that model error has in each interval, three records side by side."""
+    """Tables of the indicators with the share that model error has in each interval, three records side by
+    side.
+    """
     records, labels = saved.records[:at_most], record_labels(saved.records)
     level, k = level_text(saved.indicators["level"]), saved.indicators["k"]
     blocks = []
@@ -29,13 +31,16 @@ def indicators(saved, at_most: int | None = None) -> list:
             [name, unit, *(_with_share(r["indicators"].get(key), factor) for r in part)]
             for key, name, unit, factor in INDICATORS
         ]
-        blocks.append(Table(["Indicator", "Unit", *labels[i : i + PER_FIGURE]], rows, [1.6, 0, *[1.4] * len(part)]))
+        blocks.append(
+            Table(["Indicator", "Unit", *labels[i : i + PER_FIGURE]], rows, [1.6, 0, *[1.4] * len(part)])
+        )
     left = len(saved.records) - len(records)
     more = f" {left} further records follow on the next pages." if left > 0 else ""
     blocks.append(
         Note(
-            f"Median [{level} interval] of the reducer's own settled loop. δ is taken at ±kT_r with k = {k:g}. The share beneath "
-            f"each interval is the part of its squared width that is due to model error.{more}"
+            f"Median [{level} interval] of the reducer's own settled loop. δ is taken at ±kT_r with k = "
+            f"{k:g}. The share beneath each interval is the part of its squared width that is due to model "
+            f"error.{more}"
         )
     )
     return blocks
@@ -65,7 +70,10 @@ def mechanism(saved) -> list:
 
     return [
         _by_record(saved, ["S_g [mJ]", "S_f [mJ]", "S_g/S [–]", "S_f/S [–]"], split),
-        Note("S_g and S_f: energy that the geometric error and friction dissipate in a cycle; what is left of S is model error."),
+        Note(
+            "S_g and S_f: energy that the geometric error and friction dissipate in a cycle; what is left "
+            "of S is model error."
+        ),
     ]
 
 
@@ -80,7 +88,10 @@ def back_drive(saved) -> list:
     return [
         Heading("Back-drive"),
         _by_record(saved, ["load τ_L [N·m]", "angle turned θ_L [arcmin]", "energy absorbed W_L [mJ]"], cells),
-        Note("Angle turned and energy absorbed when the load arrives at zero torque on the rising branch of the settled loop."),
+        Note(
+            "Angle turned and energy absorbed when the load arrives at zero torque on the rising branch of "
+            "the settled loop."
+        ),
     ]
 
 
@@ -88,11 +99,16 @@ def humps(saved) -> list:
     """Bounds of the ranges W1, W2 and W3."""
 
     def cells(r):
-        return [interval_text(r["torque_energy"][key]) for key in ("tau1_Nm", "tau2_Nm")] + [significant(r["amplitude_Nm"])]
+        return [interval_text(r["torque_energy"][key]) for key in ("tau1_Nm", "tau2_Nm")] + [
+            significant(r["amplitude_Nm"])
+        ]
 
     return [
         _by_record(saved, ["τ₁ [N·m]", "τ₂ [N·m]", "amplitude T [N·m]"], cells),
-        Note("τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's convention)."),
+        Note(
+            "τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's "
+            "convention)."
+        ),
     ]
 
 
@@ -131,8 +147,13 @@ def noise(saved) -> list:
     error = saved.indicators["model_error"]["scale_rad"] * ARCMIN_PER_RAD
     return [
         Heading("Noise and model error"),
-        _by_record(saved, ["white [arcmin]", "correlated [arcmin]", "correlation time [ms]", "torque [mN·m]"], cells),
-        Note(f"Standard deviations. The smooth model error has a prior standard deviation of {significant(error, 2)} arcmin."),
+        _by_record(
+            saved, ["white [arcmin]", "correlated [arcmin]", "correlation time [ms]", "torque [mN·m]"], cells
+        ),
+        Note(
+            "Standard deviations. The smooth model error has a prior standard deviation of "
+            f"{significant(error, 2)} arcmin."
+        ),
     ]
 
 
@@ -158,40 +179,8 @@ def convergence(saved) -> list:
     return [
         Table(columns, [row], [0.8, 0.9, 1.1, 1.1, 1.8]),
         Note(
-            "Rank-normalised split R-hat and effective sample sizes (ESS) over independent ensembles, for every parameter and "
-            "indicator. Converged means R-hat below 1.01 and both ESS at least 1000 for all of them."
+            "Rank-normalised split R-hat and effective sample sizes (ESS) over independent ensembles, for "
+            "every parameter and indicator. Converged means R-hat below 1.01 and both ESS at least 1000 for "
+            "all of them."
         ),
     ]
-
-
-def least_squares(saved) -> list:
-    """The classic fit next to the posterior; nothing where it was not saved."""
-    blocks = []
-    for label, record in zip(record_labels(saved.records), saved.records, strict=True):
-        classic = record.get("least_squares") or {}
-        if classic.get("indicators"):
-            blocks.append(_classic_table(label, record, classic["indicators"], saved.indicators["level"]))
-        if classic.get("branches"):
-            blocks.append(Note("; ".join(_branch(n, b) for n, b in classic["branches"].items()) + "."))
-    if not blocks:
-        return []
-    text = (
-        "The classic evaluation fits eq. (20), reconstructed, to each branch by least squares. It gives no intervals; its "
-        "branches do not close at ±T and constant friction hides in its offset, so its S is usually too small."
-    )
-    return [Heading("Classic least-squares fit"), Paragraph(text), *blocks]
-
-
-def _classic_table(label, record, classic, level):
-    rows = []
-    for key, name, unit, factor in INDICATORS:
-        own = record["indicators"].get(key)
-        rows.append([name, unit, interval_text(own, factor), like_interval(classic.get(key), own, factor)])
-    return Table([label, "Unit", f"Posterior, {level_text(level)}", "Least squares"], rows, [1.6, 0, 1.3, 1.0])
-
-
-def _branch(name, branch):
-    ratio = branch.get("rms_high_load_over_rest")
-    high = f", rms above 0.8 T_r over the rest {significant(ratio, 2)}" if ratio is not None else ""
-    rms = significant(branch["rms_rad"] * ARCMIN_PER_RAD, 2)
-    return f"{name} branch: R² = {branch['r_squared']:.4f}, rms residual {rms} arcmin{high}"

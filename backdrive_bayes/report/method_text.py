@@ -7,15 +7,16 @@ from backdrive_bayes.report.blocks import Facts, Heading, Note, Paragraph
 SOURCE = "doi:10.1177/00202940261442382"
 
 _TEST = (
-    "The input shaft is locked and the output shaft is loaded 0 → +T → 0 → −T → 0 → +T at a constant rate. θ₊(τ) is the angle "
-    "on the branch with rising torque, θ₋(τ) on the branch with falling torque. The first loading from 0 to +T is not part of "
-    "the settled loop."
+    "The input shaft is locked and the output shaft is loaded 0 → +T → 0 → −T → 0 → +T at a constant rate. "
+    "θ₊(τ) is the angle on the branch with rising torque, θ₋(τ) on the branch with falling torque. The "
+    "first loading from 0 to +T is not part of the settled loop."
 )
 _MODEL = (
-    "Angle = offset + geometric + elastic + friction, each driven by the whole torque history. Angle noise is white plus "
-    "correlated; torque noise enters through the slope of the loop. Where the model cannot follow the data to the noise, a "
-    "smooth model error (Gaussian process over torque and branch) is inferred with it, and indicators are those of model plus "
-    "model error. Offsets are integrated out; parameters are sampled with emcee in several independent ensembles."
+    "Angle = offset + geometric + elastic + friction, each driven by the whole torque history. Angle noise "
+    "is white plus correlated; torque noise enters through the slope of the loop. Where the model cannot "
+    "follow the data to the noise, a smooth model error (Gaussian process over torque and branch) is "
+    "inferred with it, and indicators are those of model plus model error. Offsets are integrated out; "
+    "parameters are sampled with emcee in several independent ensembles."
 )
 _DEFINITIONS = [
     ("T, T_r", "amplitude of a loop; rated torque"),
@@ -23,10 +24,17 @@ _DEFINITIONS = [
     ("δ(k)", "lost motion: mean of both branches at +kT_r minus the same at −kT_r; eq. (13), reconstructed"),
     ("Peak angle", "half the angle between the tips of the settled loop at +T and −T"),
     ("S", "∫ w dτ from −T to T, energy dissipated in one cycle; eq. (21), reconstructed"),
-    ("W_abs", "absorbed strain energy: signed ∫ τ dθ along the loading quadrants 0 → +T and 0 → −T; eq. (22), reconstructed"),
+    (
+        "W_abs",
+        "absorbed strain energy: signed ∫ τ dθ along the loading quadrants 0 → +T and 0 → −T; eq. (22), "
+        "reconstructed",
+    ),
     ("u", "S / W_abs, energy dissipation ratio"),
     ("S(t), u(t)", "S and u of the loop of amplitude t, not of a window cut out of the large loop"),
-    ("Torque–energy curve", "w(|τ|): energy per unit of torque, mean of both directions; eq. (26)–(27), reconstructed"),
+    (
+        "Torque–energy curve",
+        "w(|τ|): energy per unit of torque, mean of both directions; eq. (26)–(27), reconstructed",
+    ),
     ("θ_L, W_L", "angle turned and energy absorbed when a load τ_L arrives; eq. (1) and (7), reconstructed"),
     ("Branch model", "θ±(τ) = G + a₁τ + a₃τ³ + a₅τ⁵ + A·tanh(Bτ ∓ D) ∓ d₀; eq. (20), reconstructed"),
 ]
@@ -40,7 +48,8 @@ def method_blocks() -> list:
         Paragraph(_MODEL),
         Facts(_DEFINITIONS),
         Note(
-            f"Source: {SOURCE}. Its equations were not available to us; every equation cited here is a reconstruction from the "
-            "prose, from dimensional analysis and from catalogue definitions, and is called reconstructed."
+            f"Source: {SOURCE}. Its equations were not available to us; every equation cited here is a "
+            "reconstruction from the prose, from dimensional analysis and from catalogue definitions, and "
+            "is called reconstructed."
         ),
     ]

@@ -11,7 +11,9 @@ _UNIFORM = re.compile(r"uniform on \[(\S+), (\S+)\]")
 
 
 def decimals(spread: float, value: float) -> int:
-    """Decimals that show ``spread`` (half an interval) to one or two digits, or ``value`` to three without a spread."""
+    """Decimals that show ``spread`` (half an interval) to one or two digits, or ``value`` to three without a
+    spread.
+    """
     spread, value = abs(spread), abs(value)
     if spread == 0 or not math.isfinite(spread):
         return 3 if value == 0 else max(0, min(MOST_DECIMALS, 2 - math.floor(math.log10(value))))
@@ -60,7 +62,9 @@ def level_text(level: float) -> str:
 
 
 def prior_text(prior: str, factor: float) -> str:
-    """A prior's description with its scale in the display unit; left as it is where it is of a kind not known here."""
+    """A prior's description with its scale in the display unit; left as it is where it is of a kind not known
+    here.
+    """
     if found := _LOG_NORMAL.fullmatch(prior):
         return f"log-normal, median {factor * float(found[1]):.4g}, log-sd {found[2]}"
     if found := _UNIFORM.fullmatch(prior):

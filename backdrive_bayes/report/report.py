@@ -67,17 +67,28 @@ def _typst():
 
 def _data(found, room: Path) -> dict:
     """Everything that the template prints; figures are written into ``room``."""
+    from backdrive_bayes.report.blocks import Heading
     from backdrive_bayes.report.method_text import method_blocks
 
     def placed(part):
         return [[_placed(b.data(), c, i, room) for b in getattr(c, part)] for i, c in enumerate(found)]
 
+    details = placed("details")
+    if len(found) > 1:
+        details = [[Heading(c.title, 1).data(), *blocks] for c, blocks in zip(found, details, strict=True)]
     names = [c.title for c in found]
     shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
     title = free(f"Backdrivability report: {shown}", 160)
     method = [b.data() for b in method_blocks()]
     author = f"backdrive-bayes {version('backdrive-bayes')}"
-    return {"title": title, "running": title, "author": author, "summaries": placed("summary"), "details": [*placed("details"), method]}
+    return {
+        "title": title,
+        "running": free(title, 90),
+        "author": author,
+        "summaries": placed("summary"),
+        "details": details,
+        "method": method,
+    }
 
 
 def _placed(block, chapter, i, room):
@@ -92,7 +103,9 @@ def _placed(block, chapter, i, room):
 
 
 def _fit_to_fonts(data, typst):
-    """Printable data, and font options; fonts of the system are used only where the bundled ones lack a character."""
+    """Printable data, and font options; fonts of the system are used only where the bundled ones lack a
+    character.
+    """
     from backdrive_bayes.figures.fonts import font_folder, uncovered
 
     text = "".join(set("".join(every_string(data))))

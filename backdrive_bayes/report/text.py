@@ -1,4 +1,4 @@
-"""Free text made safe to print: what cannot be shown is spelt out, what cannot be broken is made breakable."""
+"""Free text made safe to print: what cannot be shown is spelt out, long words are made breakable."""
 
 from __future__ import annotations
 

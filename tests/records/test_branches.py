@@ -143,7 +143,7 @@ def test_twins_are_cut_to_the_sample(shared_data):
         assert labels(time, torque) == SETTLED, path
 
 
-@pytest.mark.parametrize("kind, tolerance", [("small", 0.05), ("large", 0.3)])
+@pytest.mark.parametrize("kind, tolerance", [("small", 0.08), ("large", 0.3)])
 def test_real_motors_give_three_segments(shared_data, kind, tolerance):
     for path in sorted((shared_data / "cycloidal").glob(f"*/{kind}-*.csv.gz")):
         stamps, torque, command = table(path, "TIME", "TORQUE", "CONTROL_TORQUE")

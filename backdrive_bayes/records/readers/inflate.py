@@ -16,9 +16,13 @@ _XZ_MEMORY_BYTES = 128 * 2**20
 
 
 class BoundedStream(io.RawIOBase):
-    """Read-only byte stream that raises BadInput once more than ``limits`` allow has come out of ``path``."""
+    """Read-only byte stream that raises BadInput once more than ``limits`` allow has come out of ``path``.
 
-    def __init__(self, path: Path):
+    ``seen`` counts how often ``mark`` has passed.
+    """
+
+    def __init__(self, path: Path, mark: bytes = b","):
+        self._mark, self.seen = mark, 0
         self._path, self._size, self._count = path, path.stat().st_size, 0
         self._file = path.open("rb")
         self._stream = _inflater(path, self._file)
@@ -37,6 +41,7 @@ class BoundedStream(io.RawIOBase):
             ) from error
         self._count += len(chunk)
         self._check()
+        self.seen += chunk.count(self._mark)
         buffer[: len(chunk)] = chunk
         return len(chunk)
 

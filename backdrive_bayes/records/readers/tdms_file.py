@@ -19,7 +19,7 @@ def read(path: Path, choose: Choose) -> Columns:
     except ImportError as error:
         raise MissingExtra("reading TDMS", "nptdms", "readers") from error
     try:
-        with nptdms.TdmsFile.open(path) as file:
+        with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
             channels = _named(file)
             wanted = list(choose(tuple(channels)))
             for name in wanted:

@@ -1,0 +1,98 @@
+import json
+
+import numpy as np
+import pytest
+from conftest import answer, ramps
+
+from backdrive_bayes.records.check import check_unit
+from backdrive_bayes.records.record import Record, Unit
+
+ARCMIN = np.pi / 10800
+
+
+def judged(time, torque, angle=None, *, noise=0.1, rated=1.0, seed=5, **declared):
+    angle = answer(torque) if angle is None else angle
+    angle = angle + noise * ARCMIN * np.random.default_rng(seed).normal(size=len(angle))
+    result = check_unit(Unit("u", rated, (Record("r.csv", time, torque, angle, **declared),)))
+    json.dumps(result, allow_nan=False)
+    return result, result["records"][0]
+
+
+def texts(result, level):
+    return " | ".join(message["text"] for message in result["messages"] if message["level"] == level)
+
+
+def test_clean_record_is_described(tmp_path):
+    time, torque = ramps(noise=0.002, rate=0.5)
+    result, record = judged(time, torque, loading_rate_nm_per_s=0.5, amplitude_nm=1.0)
+    assert result["schema"] == "backdrive-bayes/check/1"
+    assert result["may_infer"] and not texts(result, "warning") and not texts(result, "error")
+    assert record["samples"] == len(time) and record["duration_s"] == pytest.approx(10.0, abs=0.01)
+    assert record["sampling"]["rate_hz"] == pytest.approx(200.0, rel=1e-6) and record["sampling"]["regular"]
+    assert record["cycles"] == 1 and len(record["branches"]) == 5
+    assert record["amplitude_Nm"]["estimated"] == pytest.approx(1.0, abs=0.01)
+    assert record["loading_rate_Nm_per_s"]["estimated"] == pytest.approx(0.5, rel=0.01)
+    assert record["noise"]["torque_Nm"] == pytest.approx(0.002, rel=0.3)
+    assert abs(record["closure"]["difference_rad"]) < 4 * record["closure"]["sd_rad"] + 0.05 * ARCMIN
+
+
+def test_contradiction_with_what_is_declared():
+    result, _ = judged(*ramps(noise=0.002), loading_rate_nm_per_s=0.5, amplitude_nm=2.0)
+    assert "declared amplitude 2" in texts(result, "warning")
+    assert "declared loading rate 0.5" in texts(result, "warning")
+    assert result["may_infer"] and "warnings" in result["reason"]
+
+
+def test_drifting_loop_does_not_close():
+    time, torque = ramps((0, 1, -1, 1, -1, 1), noise=0.002)
+    result, record = judged(time, torque, answer(torque) + 20 * ARCMIN * time / time[-1])
+    assert "does not close" in texts(result, "warning")
+    assert record["closure"]["basis"] == "settled loop"
+    assert record["closure"]["difference_rad"] == pytest.approx(20 * ARCMIN * 4 / time[-1], rel=0.1)
+
+
+def test_plateau_is_seen():
+    result, record = judged(*ramps((0, 2, -2, 2), limit=1.0, noise=0.002))
+    assert len(record["plateaus"]) == 2
+    assert "clipped, saturated or dwells" in texts(result, "warning")
+
+
+def test_gap_is_an_error_when_it_skips_much_torque():
+    time, torque = ramps(noise=0.002)
+    for skipped, level in ((slice(300, 310), "warning"), (slice(300, 400), "error")):
+        keep = np.delete(np.arange(len(time)), skipped)
+        result, record = judged(time[keep], torque[keep])
+        assert len(record["gaps"]) == 1
+        assert "gap in time" in texts(result, level)
+        assert result["may_infer"] == (level == "warning")
+
+
+def test_drop_outs_are_counted():
+    time, torque = ramps(noise=0.002)
+    torque[[150, 333, 700]] = 0.0
+    result, record = judged(time, torque)
+    assert record["drop_outs"]["torque"] == 3
+    assert "3 isolated torque samples" in texts(result, "warning")
+
+
+def test_frozen_channel_speaks_against_inference():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    angle[250:450] = angle[250]
+    result, _ = judged(time, torque, angle, noise=0.0)
+    assert "angle stands still for 200 samples from sample 251" in texts(result, "error")
+    assert not result["may_infer"] and "stands still" in result["reason"]
+
+
+def test_angle_lost_in_noise_speaks_against_inference():
+    result, _ = judged(*ramps(noise=0.002), noise=500.0)
+    assert not result["may_infer"] and "not clear of its noise" in result["reason"]
+
+
+def test_overload_offset_and_uneven_sampling_are_said():
+    time, torque = ramps(hertz=1000, noise=0.002)
+    keep = np.sort(np.random.default_rng(2).choice(len(time), 1500, replace=False))
+    result, _ = judged(time[keep], torque[keep] + 0.1, rated=0.5)
+    assert "above the rated" in texts(result, "warning")
+    assert "off centre" in texts(result, "warning")
+    assert "sampling is uneven" in texts(result, "info")
