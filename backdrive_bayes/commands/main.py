@@ -13,6 +13,7 @@ from backdrive_bayes.errors import BadInput, MissingExtra
 VERBS = {
     "check": "check",
     "fit": "fit",
+    "report": "report",
 }
 _DESCRIPTION = (
     "Bayesian inference of a robot reducer's geometric error, stiffness and friction from torque-angle loops."

@@ -112,7 +112,7 @@ def _inner_ticks(lo, hi):
 
 
 def _name(name, unit):
-    parts = words(name).split(" ")
-    half = -(-len(parts) // 2)
-    lines = [" ".join(parts[:half]), " ".join(parts[half:])]
-    return "\n".join(line for line in (*lines, f"[{unit}]" if unit else "[–]") if line)
+    """Two lines, which is what fits beside a panel; the unit closes the second."""
+    *first, last = words(name).split(" ")
+    unit = f"[{unit or '–'}]"
+    return f"{' '.join(first)}\n{last} {unit}" if first else f"{last}\n{unit}"

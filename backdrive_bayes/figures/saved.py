@@ -66,8 +66,8 @@ class Saved:
 class RecordBlocks:
     """Blocks of one record, arrays of shape (blocks,), replicates (draws, blocks).
 
-    ``angle_rad`` and ``replicates_rad`` are free of the encoder's offset; ``direction`` is +1 or -1; ``first``
-    marks the first loading from rest.
+    ``angle_rad`` and ``replicates_rad`` are free of the encoder's offset; ``direction`` is +1 or -1;
+    ``first`` marks the first loading from rest.
     """
 
     torque_nm: np.ndarray

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 
 from backdrive_bayes.inference.optimum import Optimum
 from backdrive_bayes.inference.problem import Problem
@@ -23,7 +23,7 @@ FIRST_LEG_TERMS = 16
 LENGTHS = np.array([0.01, 0.03, 0.1, 0.3])
 ROUGHNESS = (1.0, 2.0)
 """Spectral exponents: Matérn-1/2, which may have kinks, and Matérn-3/2, which is smooth."""
-RELATIVE_SCALES = np.geomspace(3e-5, 0.3, 9)
+RELATIVE_SCALES = np.geomspace(1e-5, 0.3, 31)
 PROBE = 1e-4
 
 
@@ -71,11 +71,13 @@ def settled_path(half_nm) -> TorquePath:
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """Posterior of the discrepancy's coefficients and what is needed to evaluate it anywhere on the loops.
+    """The Gaussian process, its hyperparameters, and what conditions it on a residual.
 
-    ``scale_rad`` is the prior standard deviation of the largest loop, ``length`` the length scale in loops, ``roughness`` the spectral exponent, ``gain`` the log
-    evidence against no discrepancy, ``misfit`` the part of χ² that it explains,
-    ``relative`` (records,) the scale of each record's loop against the largest.
+    ``scale_rad`` is the prior standard deviation on the largest loop, ``length`` the length scale in loops, ``roughness`` the
+    spectral exponent, ``gain`` the log evidence against no discrepancy, ``relative`` (records,) the scale of each record's loop
+    against the largest. ``conditioner`` (blocks, terms) turns whitened residuals into mean coefficients, ``factor`` (terms,
+    terms) is a square root of their covariance. ``absorber`` (blocks, rank) spans what the discrepancy takes out of χ², which
+    is ``misfit`` at the mode.
     """
 
     coordinates: tuple[LoopCoordinate, ...]
@@ -84,20 +86,29 @@ class Discrepancy:
     length: float
     roughness: float
     gain: float
-    mean: np.ndarray
-    factor: np.ndarray
-    absorbed: np.ndarray
-    misfit: float
     relative: np.ndarray
+    absorbed: np.ndarray
+    conditioner: np.ndarray
+    factor: np.ndarray
+    absorber: np.ndarray
+    misfit: float
 
     @property
     def present(self) -> bool:
         """Whether there is any discrepancy."""
         return self.scale_rad > 0
 
-    def draw(self, rng, draws: int) -> np.ndarray:
-        """Coefficients of shape (draws, terms)."""
-        return self.mean + rng.normal(size=(draws, self.mean.size)) @ self.factor.T
+    def mean(self, problem: Problem, z) -> np.ndarray:
+        """Mean coefficients given coordinates ``z`` (…, dimension), shape (…, terms)."""
+        return np.concatenate(problem.residuals(z), axis=-1) @ self.conditioner
+
+    def draw(self, problem: Problem, z, rng) -> np.ndarray:
+        """Coefficients given each of ``z`` (draws, dimension), shape (draws, terms)."""
+        terms = self.factor.shape[0]
+        if not self.present:
+            return np.zeros((len(z), terms))
+        mean = np.concatenate([self.mean(problem, part) for part in np.array_split(z, max(1, len(z) // 500))])
+        return mean + rng.standard_normal((len(z), terms)) @ self.factor.T
 
     def raw_basis(self, record: int, path: TorquePath) -> np.ndarray:
         """One record's own basis before the parameters' directions are taken out, shape (samples, terms of a record)."""
@@ -107,7 +118,7 @@ class Discrepancy:
         """Orthogonal basis at the samples of ``path`` in the state of ``record``, shape (samples, terms)."""
         raw = _basis(self.coordinates[record], path, first_leg)
         width = raw.shape[1]
-        full = np.zeros((raw.shape[0], self.mean.size))
+        full = np.zeros((raw.shape[0], self.factor.shape[0]))
         full[:, record * width : (record + 1) * width] = raw
         return full - angle_jacobian(problem, self.optimum.z, record, path) @ self.absorbed
 
@@ -129,29 +140,23 @@ def learn_discrepancy(problem: Problem, optimum: Optimum) -> Discrepancy:
     # jacobian = d(residual)/dz = -d(angle)/dz, hence the sign.
     absorbed = -cho_solve(normal, jacobian.T @ basis)
     basis = basis + jacobian @ absorbed
-    gram, projection = basis.T @ basis, basis.T @ residual
     span = np.array([np.ptp(d.blocks.angle_rad) for d in problem.records])
     relative = span / span.max()
     # Structure shorter than the noise's own memory cannot be told from noise.
     shortest = max(3 * d.noise.correlation_time_s / _loop_time_s(d) for d in problem.records)
     lengths = LENGTHS[LENGTHS >= min(shortest, LENGTHS[-1])]
-    scale, length, roughness, gain = _most_evident(gram, projection, relative, span.max(), lengths)
-    terms = projection.size
-    if gain <= 0:
-        zero = np.zeros(terms)
-        return Discrepancy(coordinates, optimum, 0.0, length, roughness, 0.0, zero, np.zeros((terms, terms)), absorbed, 0.0, relative)
-    deviation = scale * _shape(length, roughness, relative)
-    lower = np.linalg.cholesky(np.eye(terms) + deviation[:, None] * gram * deviation)
-    factor = deviation[:, None] * solve_triangular(lower, np.eye(terms), lower=True).T
-    mean = factor @ (factor.T @ projection)
-    misfit = max(float(projection @ mean), 0.0)
-    return Discrepancy(coordinates, optimum, scale, length, roughness, gain, mean, factor, absorbed, misfit, relative)
-
-
-def fitted_at_blocks(problem: Problem, discrepancy: Discrepancy, record: int) -> np.ndarray:
-    """Mean discrepancy at the blocks of a record [rad], shape (blocks,)."""
-    data = problem.records[record]
-    return discrepancy.basis_on(problem, record, data.path, first_leg=True) @ discrepancy.mean
+    scale, length, roughness, gain = _most_evident(problem, basis, residual, relative, span.max(), lengths)
+    deviation = scale * np.concatenate([share * prior_deviation(length, roughness) for share in relative])
+    value, vector = np.linalg.eigh(deviation[:, None] * (basis.T @ basis) * deviation)
+    value = np.maximum(value, 0.0)
+    root = (deviation[:, None] * vector) / np.sqrt(1 + value)
+    seen = value > 1e-4
+    absorber = basis @ root[:, seen]
+    conditioner = absorber @ root[:, seen].T
+    misfit = float(np.sum((absorber.T @ residual) ** 2))
+    return Discrepancy(
+        coordinates, optimum, scale, length, roughness, gain, relative, absorbed, conditioner, root, absorber, misfit
+    )
 
 
 def _loop_time_s(data):
@@ -172,11 +177,6 @@ def _basis(coordinate, path, first_leg):
     return np.concatenate([np.cos(angle), np.sin(angle), first], axis=1)
 
 
-def _shape(length, roughness, relative):
-    one = prior_deviation(length, roughness)
-    return np.concatenate([share * one for share in relative])
-
-
 def prior_deviation(length: float, roughness: float) -> np.ndarray:
     """Prior standard deviation of one record's coefficients for unit scale, shape (terms,), of a Matérn spectrum."""
     loop = (1 + (2 * np.pi * np.arange(1, HARMONICS + 1) * length) ** 2) ** -roughness
@@ -195,17 +195,29 @@ def _whitened_basis(problem, coordinates):
     return basis
 
 
-def _most_evident(gram, projection, relative, span, lengths):
-    """Scale [rad], length, roughness and gain in log evidence over no discrepancy, the best of a grid."""
+def _most_evident(problem, basis, residual, relative, span, lengths):
+    """Scale [rad], length, roughness and gain in log evidence over no discrepancy, the best of a grid.
+
+    For the choice alone, the small couplings between records that orthogonality brings are left out.
+    """
+    width, row, parts = 2 * HARMONICS + FIRST_LEG_TERMS, 0, []
+    for r, data in enumerate(problem.records):
+        n = data.blocks.angle_rad.size
+        own = basis[row : row + n, r * width : (r + 1) * width]
+        parts.append((own.T @ own, own.T @ residual[row : row + n]))
+        row += n
+    scale2 = (span * RELATIVE_SCALES[:, None]) ** 2
     best = (0.0, lengths[0], ROUGHNESS[0], 0.0)
     for roughness in ROUGHNESS:
         for length in lengths:
-            shape = _shape(length, roughness, relative)
-            scaled, load = shape[:, None] * gram * shape, shape * projection
-            for scale in span * RELATIVE_SCALES:
-                lower = np.linalg.cholesky(np.eye(load.size) + scale**2 * scaled)
-                explained = scale * solve_triangular(lower, load, lower=True)
-                gain = 0.5 * explained @ explained - np.log(np.diag(lower)).sum()
-                if gain > best[3]:
-                    best = (float(scale), float(length), roughness, float(gain))
+            one, gain = prior_deviation(length, roughness), np.zeros(RELATIVE_SCALES.size)
+            for share, (gram, projection) in zip(relative, parts, strict=True):
+                deviation = share * one
+                value, vector = np.linalg.eigh(deviation[:, None] * gram * deviation)
+                spread = 1 + scale2 * np.maximum(value, 0.0)
+                load = (vector.T @ (deviation * projection)) ** 2
+                gain += 0.5 * np.sum(scale2 * load / spread - np.log(spread), axis=1)
+            k = int(np.argmax(gain))
+            if gain[k] > best[3]:
+                best = (float(span * RELATIVE_SCALES[k]), float(length), roughness, float(gain[k]))
     return best

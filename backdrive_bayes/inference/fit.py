@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.inference.diagnostics import Convergence, Outcome, diagnose_draws
 from backdrive_bayes.inference.discrepancy import Discrepancy, learn_discrepancy
@@ -129,7 +130,12 @@ def fit(
     ``quantities`` names further quantities of the draws (indicators) that must converge too. Sampling stops when every
     parameter and quantity has converged or the settings' budget is spent; the outcome says which.
     """
-    settings = settings or Settings()
+    # The arrays are small: BLAS threads would spend their time waiting for each other.
+    with threadpool_limits(1, user_api="blas"):
+        return _fit(unit, baseline, seed, settings or Settings(), quantities, scale, progress)
+
+
+def _fit(unit, baseline, seed, settings, quantities, scale, progress) -> Posterior:
     began = time.perf_counter()
     rng = np.random.default_rng(seed)
     progress("reducing the records and finding the posterior mode")
@@ -145,7 +151,7 @@ def fit(
     state: dict = {}
 
     def enough(drawn: Ensembles) -> bool:
-        state["weights"] = _draw_weights(discrepancy, drawn, seed)
+        state["weights"] = _draw_weights(problem, discrepancy, drawn, seed)
         convergence = diagnose_draws(problem.labels, drawn.z, drawn.step, time.perf_counter() - began)
         if convergence.outcome is Outcome.CONVERGED and quantities is not None:
             names, values = _quantity_draws(problem, discrepancy, drawn, state["weights"], quantities)
@@ -162,10 +168,9 @@ def fit(
     return Posterior(unit, problem, discrepancy, drawn, state["weights"], state["convergence"], seed)
 
 
-def _draw_weights(discrepancy, drawn, seed):
-    ensembles, draws = drawn.z.shape[:2]
-    rng = np.random.default_rng([seed, 1])
-    return discrepancy.draw(rng, ensembles * draws).reshape(ensembles, draws, -1)
+def _draw_weights(problem, discrepancy, drawn, seed):
+    flat = drawn.z.reshape(-1, problem.dimension)
+    return discrepancy.draw(problem, flat, np.random.default_rng([seed, 1])).reshape(*drawn.z.shape[:2], -1)
 
 
 def _quantity_draws(problem, discrepancy, drawn, weights, quantities):

@@ -54,7 +54,7 @@ def _linearise(problem, z):
     probes = np.concatenate([z[None], z + STEP * np.eye(n), z - STEP * np.eye(n)])
     whitened = np.concatenate(problem.residuals(probes), axis=-1)
     residual, jacobian = whitened[0], (whitened[1 : n + 1] - whitened[n + 1 :]).T / (2 * STEP)
-    chi2 = max(residual @ residual - problem.misfit, 0.0)
+    chi2 = max(float(residual @ residual) - problem.misfit, 0.0)
     return residual, jacobian, (problem.noise_dof + chi2) / (problem.noise_dof + problem.dof)
 
 

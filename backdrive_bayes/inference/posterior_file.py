@@ -140,19 +140,15 @@ def _replicates(posterior, angle, offsets, rng):
 
 
 def _log_likelihood(posterior):
-    """Log density of each whitened block residual after the mean discrepancy, float32 (chain, draw, block)."""
+    """Log density of each whitened block residual less the mean discrepancy given the draw, float32 (chain, draw, block)."""
     problem = posterior.problem
-    shift = [0.0] * len(problem.records)
-    if posterior.discrepancy.present:
-        mean = posterior.discrepancy.mean
-        shift = [
-            d.whitener @ (posterior.discrepancy.basis_on(problem, r, d.path, first_leg=True) @ mean)
-            for r, d in enumerate(problem.records)
-        ]
+    discrepancy = posterior.discrepancy
     out = []
     for part in np.array_split(posterior.z, max(1, posterior.z.shape[0] // 500)):
-        white = [w - s for w, s in zip(problem.residuals(part), shift, strict=True)]
-        out.append(-0.5 * np.concatenate(white, axis=-1) ** 2 - 0.5 * np.log(2 * np.pi))
+        white = np.concatenate(problem.residuals(part), axis=-1)
+        if discrepancy.present:
+            white = white - (white @ discrepancy.absorber) @ discrepancy.absorber.T
+        out.append(-0.5 * white**2 - 0.5 * np.log(2 * np.pi))
     return np.concatenate(out).reshape(*posterior.ensembles.z.shape[:2], -1).astype(np.float32)
 
 

@@ -2,8 +2,8 @@
 
 All records share the model's parameters; parameters marked ``per_record`` and the encoder's offset belong to one record.
 Offsets are marginalised exactly under a flat prior, a common factor on the noise variance under a scaled inverse-chi-square
-prior that carries the uncertainty of the noise estimate (which makes the likelihood a Student-t). ``misfit`` is the part of
-χ² that the model discrepancy explains.
+prior that carries the uncertainty of the noise estimate (which makes the likelihood a Student-t). ``misfit`` is the
+part of χ² that the model discrepancy explains at the mode; being orthogonal to the parameters' directions it is a constant.
 """
 
 from __future__ import annotations
@@ -155,9 +155,9 @@ class Problem:
 
     def log_likelihood(self, z) -> np.ndarray:
         """Log likelihood with offsets and the common noise factor marginalised, shape (…,), up to a constant."""
-        chi2 = sum(np.einsum("...i,...i->...", r, r) for r in self.residuals(z)) - self.misfit
-        nu = self.noise_dof
-        return -0.5 * (nu + self.dof) * np.log1p(np.maximum(chi2, 0.0) / nu)
+        residual = np.concatenate(self.residuals(z), axis=-1)
+        chi2 = np.einsum("...i,...i->...", residual, residual)
+        return -0.5 * (self.noise_dof + self.dof) * np.log1p(np.maximum(chi2 - self.misfit, 0.0) / self.noise_dof)
 
     def log_posterior(self, z) -> np.ndarray:
         """Log posterior density of z, shape (walkers,), up to a constant; ``z`` has shape (walkers, dimension)."""

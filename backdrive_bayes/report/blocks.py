@@ -76,8 +76,8 @@ class Table(Block):
 class Picture(Block):
     """A figure by name, with its caption, which is also its alternative text.
 
-    One that ``floats`` lets the text behind it go first; one that is ``spilt`` is shown only where its summary
-    had no room for it.
+    One that ``floats`` lets the text behind it go first; one that is ``spilt`` is shown only where its
+    summary had no room for it.
     """
 
     kind = "picture"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, record_labels
 from backdrive_bayes.report.blocks import Heading, Note, Paragraph, Table
 from backdrive_bayes.report.fit_tables import INDICATORS
-from backdrive_bayes.report.numbers import interval_text, level_text, like_interval, significant
+from backdrive_bayes.report.numbers import fixed, interval_text, level_text, like_interval, significant
 
 
 def least_squares(saved) -> list:
@@ -40,5 +40,5 @@ def _classic_table(label, record, classic, level):
 def _branch(name, branch):
     ratio = branch.get("rms_high_load_over_rest")
     high = f", rms above 0.8 T_r over the rest {significant(ratio, 2)}" if ratio is not None else ""
-    rms = significant(branch["rms_rad"] * ARCMIN_PER_RAD, 2)
-    return f"{name} branch: R² = {branch['r_squared']:.4f}, rms residual {rms} arcmin{high}"
+    rms = significant(branch["rms_rad"], 2, ARCMIN_PER_RAD)
+    return f"{name} branch: R² = {fixed(branch['r_squared'], 4)}, rms residual {rms} arcmin{high}"

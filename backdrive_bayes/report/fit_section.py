@@ -14,13 +14,12 @@ from backdrive_bayes.report.blocks import (
     Chapter,
     Facts,
     Heading,
-    Note,
     Paragraph,
     Picture,
     Signature,
 )
 from backdrive_bayes.report.classic_tables import least_squares
-from backdrive_bayes.report.numbers import interval_text, level_text, prior_text
+from backdrive_bayes.report.numbers import fixed, interval_text, level_text, prior_text
 from backdrive_bayes.report.text import free
 
 ON_SUMMARY = 2 * PER_FIGURE
@@ -52,8 +51,8 @@ def chapter(folder: Path) -> Chapter:
 def _verdict(saved):
     found = saved.indicators["convergence"]
     numbers = (
-        f"Largest R-hat {found['max_rhat']:.3f}; smallest effective sample size {found['min_bulk_ess']:.0f} "
-        f"(bulk) and {found['min_tail_ess']:.0f} (tail)."
+        f"Largest R-hat {fixed(found['max_rhat'], 3)}; smallest effective sample size "
+        f"{fixed(found['min_bulk_ess'], 0)} (bulk) and {fixed(found['min_tail_ess'], 0)} (tail)."
     )
     if found["converged"]:
         return Banner("good", "CONVERGED: the intervals may be used", numbers)
@@ -68,7 +67,7 @@ def _identity(saved):
     credit = [(key.capitalize(), free(identity.pop(key))) for key in ("credit", "license") if key in identity]
     rows = [
         ("Unit", free(about["unit"])),
-        *((free(words(k).capitalize(), 40), free(v)) for k, v in identity.items()),
+        *((free(words(k).capitalize(), 20), free(v)) for k, v in identity.items()),
     ]
     if "rated_torque_nm" in attributes:
         rows.append(("Rated torque", f"{attributes['rated_torque_nm']:g} N·m"))
@@ -134,7 +133,6 @@ def _parameters(saved):
     return [
         Heading("Parameters and priors"),
         tables.parameter_table(rows, saved.indicators["level"]),
-        Note("Priors are stated in the unit of the row."),
     ]
 
 
@@ -147,7 +145,7 @@ def _reproduction(saved):
         ("Sampler", f"{attributes['inference_library']} {attributes['inference_library_version']}"),
         ("Seed", str(attributes["seed"])),
         ("Data, SHA-256", attributes["data_sha256"] or "not recorded"),
-        ("Time", f"{saved.indicators['convergence']['seconds']:.0f} s for reduction and sampling"),
+        ("Time", f"{fixed(saved.indicators['convergence']['seconds'], 0)} s for reduction and sampling"),
     ]
     return [
         Heading("Reproduction"),

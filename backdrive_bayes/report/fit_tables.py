@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, record_labels, words
 from backdrive_bayes.report.blocks import Heading, Note, Table
-from backdrive_bayes.report.numbers import interval_text, level_text, percent, significant
+from backdrive_bayes.report.numbers import fixed, interval_text, level_text, percent, significant
 from backdrive_bayes.report.text import free
 
 INDICATORS = (
@@ -133,7 +133,11 @@ def by_amplitude(saved) -> list:
 
 def parameter_table(rows, level: float) -> Table:
     """Parameters with posterior and prior."""
-    return Table(["Parameter", f"Posterior, {level_text(level)}", "Unit", "Prior"], rows, [1.5, 1.35, 0, 1.6])
+    return Table(
+        ["Parameter", f"Posterior, {level_text(level)}", "Unit", "Prior (same unit)"],
+        rows,
+        [1.5, 1.35, 0, 1.6],
+    )
 
 
 def noise(saved) -> list:
@@ -141,18 +145,17 @@ def noise(saved) -> list:
 
     def cells(r):
         n = r["noise"]
-        angles = [significant(n[k] * ARCMIN_PER_RAD, 2) for k in ("white_rad", "correlated_rad")]
-        return [*angles, significant(n["correlation_time_s"] * 1e3, 2), significant(n["torque_Nm"] * 1e3, 2)]
+        angles = [significant(n[k], 2, ARCMIN_PER_RAD) for k in ("white_rad", "correlated_rad")]
+        return [*angles, significant(n["correlation_time_s"], 2, 1e3), significant(n["torque_Nm"], 2, 1e3)]
 
-    error = saved.indicators["model_error"]["scale_rad"] * ARCMIN_PER_RAD
+    error = significant(saved.indicators["model_error"]["scale_rad"], 2, ARCMIN_PER_RAD)
     return [
         Heading("Noise and model error"),
         _by_record(
             saved, ["white [arcmin]", "correlated [arcmin]", "correlation time [ms]", "torque [mN·m]"], cells
         ),
         Note(
-            "Standard deviations. The smooth model error has a prior standard deviation of "
-            f"{significant(error, 2)} arcmin."
+            f"Standard deviations. The smooth model error has a prior standard deviation of {error} arcmin."
         ),
     ]
 
@@ -170,9 +173,9 @@ def convergence(saved) -> list:
     found = saved.indicators["convergence"]
     row = [
         "yes" if found["converged"] else "NO",
-        f"{found['max_rhat']:.4f}",
-        f"{found['min_bulk_ess']:.0f}",
-        f"{found['min_tail_ess']:.0f}",
+        fixed(found["max_rhat"], 4),
+        fixed(found["min_bulk_ess"], 0),
+        fixed(found["min_tail_ess"], 0),
         quantity_name(saved, found.get("worst", "–")),
     ]
     columns = ["Converged", "largest R-hat", "smallest bulk ESS", "smallest tail ESS", "slowest quantity"]

@@ -6,6 +6,7 @@ import math
 import re
 
 MOST_DECIMALS = 8
+UNDEFINED = "not defined"
 _LOG_NORMAL = re.compile(r"log-normal, median (\S+), log-sd (\S+)")
 _UNIFORM = re.compile(r"uniform on \[(\S+), (\S+)\]")
 
@@ -25,7 +26,7 @@ def decimals(spread: float, value: float) -> int:
 def interval_text(interval: dict | None, factor: float = 1.0) -> str:
     """``median [lo, hi]`` times ``factor`` with the same decimals; "not defined" for None."""
     if interval is None:
-        return "not defined"
+        return UNDEFINED
     median, lo, hi = (factor * interval[k] for k in ("median", "lo", "hi"))
     n = decimals(0.5 * (hi - lo), median)
     return f"{_fixed(median, n)} [{_fixed(lo, n)}, {_fixed(hi, n)}]"
@@ -34,15 +35,21 @@ def interval_text(interval: dict | None, factor: float = 1.0) -> str:
 def like_interval(value: float | None, interval: dict | None, factor: float = 1.0) -> str:
     """A single value with the decimals of the interval beside it."""
     if value is None:
-        return "not defined"
+        return UNDEFINED
     spread = 0.5 * (interval["hi"] - interval["lo"]) if interval else 0.0
     return _fixed(factor * value, decimals(factor * spread, factor * value))
 
 
-def significant(value: float | None, digits: int = 3) -> str:
-    """A value to some significant digits, without exponent where it can be helped."""
+def fixed(value: float | None, n: int) -> str:
+    """A value with ``n`` decimals."""
+    return UNDEFINED if value is None or not math.isfinite(value) else _fixed(value, n)
+
+
+def significant(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
+    """``factor`` times a value to some significant digits, without exponent where it can be helped."""
     if value is None or not math.isfinite(value):
-        return "not defined"
+        return UNDEFINED
+    value *= factor
     if value == 0:
         return "0"
     power = int(f"{value:.{digits - 1}e}".partition("e")[2])

@@ -17,7 +17,17 @@ def chapters(folder: Path) -> list[Chapter]:
     folder = Path(folder)
     if not folder.is_dir():
         raise BadInput(folder, "a result folder", "no such folder")
-    found = [make(folder) for name, make in SECTIONS.items() if (folder / name).exists()]
+    found = [_chapter(make, folder / name) for name, make in SECTIONS.items() if (folder / name).exists()]
     if not found:
         raise BadInput(folder, f"a result folder with {' or '.join(SECTIONS)}", "none of them")
     return found
+
+
+def _chapter(make, path: Path) -> Chapter:
+    try:
+        return make(path.parent)
+    except BadInput:
+        raise
+    except (KeyError, IndexError, TypeError, AttributeError, ValueError) as error:
+        text = f"{type(error).__name__} {error}"
+        raise BadInput(path, "a complete result file and its posterior.nc", text) from error

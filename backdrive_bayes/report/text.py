@@ -11,6 +11,7 @@ BREAK = "\u200b"
 LOW, END = "\ue000", "\ue001"
 """Marks around an index; free text cannot hold them, because :func:`printable` spells them out."""
 _SYMBOLS = re.compile(r"(?<![A-Za-z])(k?[WSTθτ])_(abs|g|f|r|L)(?![A-Za-z])")
+_DIGEST = re.compile(r"[0-9a-f]{64}")
 _INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
 
 
@@ -42,7 +43,10 @@ def _spelt(character):
 
 def _breakable(found):
     word, step = found[0], UNBREAKABLE // 2
-    return BREAK.join(word[i : i + step] for i in range(0, len(word), step))
+    # A digest fits its line, and a break inside it would be copied along with it.
+    return (
+        word if _DIGEST.fullmatch(word) else BREAK.join(word[i : i + step] for i in range(0, len(word), step))
+    )
 
 
 def every_string(data) -> list[str]:

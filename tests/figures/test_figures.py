@@ -1,0 +1,161 @@
+"""Figures draw from saved results alone, carry units and do not overlap."""
+
+import hashlib
+import subprocess
+import sys
+from itertools import combinations
+
+import numpy as np
+import pytest
+from support_results import write_result
+
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.figures import catalogue, loop
+from backdrive_bayes.figures.saved import Saved, record_blocks
+from backdrive_bayes.figures.style import record_labels, styled
+
+NAMES = ["loop", "modules", "torque-energy", "amplitude", "corner", "trace", "predictive"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("result")
+    write_result(path, records=3)
+    return path
+
+
+@pytest.fixture(scope="module")
+def figures(folder):
+    return catalogue.all_figures(folder)
+
+
+def texts(figure):
+    """Texts that are drawn, with their boxes in pixels."""
+    with styled():
+        figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    found = [*figure.texts, *(t for legend in figure.legends for t in legend.get_texts())]
+    found += [figure._suptitle] if figure._suptitle and figure._suptitle not in found else []
+    for axes in (a for a in figure.axes if a.get_visible()):
+        legend = axes.get_legend()
+        found += legend.get_texts() if legend else []
+        if axes.axison:
+            found += [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts, *_tick_labels(axes)]
+    found = [t for t in found if t.get_visible() and t.get_text().strip()]
+    return [(t, t.get_window_extent(renderer)) for t in found]
+
+
+def _tick_labels(axes):
+    for axis, limits in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        lo, hi = sorted(limits)
+        for tick in axis.get_major_ticks():
+            if lo <= tick.get_loc() <= hi:
+                yield tick.label1
+
+
+def test_every_figure_is_drawn_and_has_a_caption(figures):
+    assert list(figures) == NAMES
+    assert all(catalogue.caption(name) for name in figures)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_text_overlaps_or_leaves_the_figure(figures, name):
+    shown = texts(figures[name])
+    frame = figures[name].bbox
+    for text, box in shown:
+        inside = (
+            box.x0 >= frame.x0 - 1
+            and box.x1 <= frame.x1 + 1
+            and box.y0 >= frame.y0 - 1
+            and box.y1 <= frame.y1 + 1
+        )
+        assert inside, f"'{text.get_text()}' is cut"
+    for (a, box_a), (b, box_b) in combinations(shown, 2):
+        wide = min(box_a.x1, box_b.x1) - max(box_a.x0, box_b.x0)
+        high = min(box_a.y1, box_b.y1) - max(box_a.y0, box_b.y0)
+        assert wide < 1 or high < 1, f"'{a.get_text()}' and '{b.get_text()}' overlap"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_text_is_below_eight_points(figures, name):
+    assert min(text.get_size() for text, _ in texts(figures[name])) >= 8
+
+
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [
+        ("loop", ["torque [N·m]", "angle [arcmin]"]),
+        ("modules", ["torque [N·m]", "angle [arcmin]"]),
+        ("torque-energy", ["|torque| [N·m]", "[mJ/(N·m)]"]),
+        ("amplitude", ["amplitude t [N·m]", "S(t) [mJ]", "u(t) [–]"]),
+        ("corner", ["[arcmin]", "[mN·m]"]),
+        ("predictive", ["angle range [arcmin]", "rms step [arcmin]"]),
+    ],
+)
+def test_axes_carry_units(figures, name, units):
+    labels = " ".join(text.get_text() for text, _ in texts(figures[name]))
+    assert all(unit in labels for unit in units)
+
+
+def test_loop_shows_first_loading_apart_from_the_settled_loop(figures):
+    names = [t.get_text() for t in figures["loop"].legends[0].get_texts()]
+    assert "measured, first loading" in names and len(set(names)) == 5
+
+
+def test_the_residual_is_free_of_the_offset(folder):
+    blocks = record_blocks(Saved.read(folder), 1)
+    assert np.abs(blocks.residual_rad).max() < 2e-3
+    assert blocks.first.sum() == 30 and set(blocks.direction) == {-1.0, 1.0}
+
+
+def test_many_records_make_several_figures_with_distinct_labels(tmp_path):
+    result = write_result(tmp_path, records=7)
+    for record in result["records"]:
+        record["loading_rate_Nm_per_s"] = 0.05
+    assert len(set(record_labels(result["records"]))) == 7
+    assert {"loop", "loop-2", "loop-3", "amplitude-2"} <= set(catalogue.all_figures(tmp_path))
+
+
+def test_the_json_alone_gives_the_figures_that_need_no_draws(tmp_path):
+    write_result(tmp_path, records=1)
+    (tmp_path / "posterior.nc").unlink()
+    assert list(catalogue.all_figures(tmp_path)) == NAMES[:4]
+
+
+def test_files_are_the_same_bytes_again(folder, tmp_path):
+    def digest(out):
+        saved = Saved.read(folder)
+        figure = loop.draw(saved, [0])
+        paths = [
+            catalogue.save_svg(figure, out.with_suffix(".svg")),
+            catalogue._save_png(figure, out.with_suffix(".png")),
+        ]
+        return [hashlib.sha256(p.read_bytes()).hexdigest() for p in paths]
+
+    assert digest(tmp_path / "a") == digest(tmp_path / "b")
+    assert b"<dc:date>" not in (tmp_path / "a.svg").read_bytes()
+
+
+def test_save_figures_writes_vector_and_pixels(tmp_path):
+    write_result(tmp_path / "r", records=1)
+    written = catalogue.save_figures(tmp_path / "r", tmp_path / "figures")
+    assert len(written) == 14 and all(p.stat().st_size > 1000 for p in written)
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", '{"schema": "other/1"}'])
+def test_a_bad_result_file_is_one_clear_line(tmp_path, content):
+    if content is not None:
+        (tmp_path / "indicators.json").write_text(content)
+    with pytest.raises(BadInput, match="indicators.json: expected"):
+        Saved.read(tmp_path)
+
+
+def test_without_matplotlib_the_message_names_the_extra():
+    code = (
+        "import sys; sys.modules['matplotlib'] = None\n"
+        "from backdrive_bayes.errors import MissingExtra\n"
+        "try:\n    import backdrive_bayes.figures.catalogue\n"
+        "except MissingExtra as e:\n    print(e)\n"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "backdrive-bayes[figures]" in shown

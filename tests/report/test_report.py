@@ -1,0 +1,199 @@
+"""The PDF holds the numbers of the JSON, prints free text as it stands and is the same bytes again."""
+
+import io
+import json
+import re
+
+import pypdf
+import pytest
+from support_results import GROUP_ATTRIBUTES, indicators, write_result
+
+from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.report import report
+from backdrive_bayes.report.numbers import interval_text, percent, prior_text, significant
+from backdrive_bayes.report.text import printable
+
+HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref //"
+ARCMIN = 10800 / 3.141592653589793
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The object behind a report, its bytes and its reader."""
+    folder = tmp_path_factory.mktemp("fit")
+    identity = {"material": "steel #eval(1)", "credit": "A. Author 2024", "license": "CC BY 4.0"}
+    result = write_result(folder, records=2, unit=HOSTILE, identity=identity)
+    data = report.report_bytes([folder])
+    return result, data, pypdf.PdfReader(io.BytesIO(data)), folder
+
+
+def text_of(reader, page=None):
+    pages = reader.pages if page is None else [reader.pages[page]]
+    return " ".join(" ".join(p.extract_text() for p in pages).split())
+
+
+def test_the_first_page_has_the_indicators_of_the_json(made):
+    result, _, reader, _ = made
+    page = text_of(reader, 0)
+    factors = {"rad": ARCMIN, "J": 1e3, "ratio": 1.0}
+    for record in result["records"]:
+        for name, entry in record["indicators"].items():
+            factor = factors[name.rsplit("_", 1)[1]]
+            median, lo, hi = (float(v) for v in re.findall(r"[\d.]+", interval_text(entry, factor)))
+            assert median == pytest.approx(
+                factor * entry["median"], abs=0.35 * factor * (entry["hi"] - entry["lo"])
+            )
+            assert interval_text(entry, factor) in page
+            assert lo <= median <= hi
+    assert "91 % from model error" in page and "k = 0.03" in page and "90 %" in page
+    assert GROUP_ATTRIBUTES["data_sha256"] in page and "CONVERGED" in page and "INCONCLUSIVE" not in page
+    assert "A. Author 2024" in page and "CC BY 4.0" in page
+
+
+def test_free_text_prints_as_it_stands(made):
+    _, _, reader, _ = made
+    assert HOSTILE in text_of(reader, 0)
+    assert "steel #eval(1)" in text_of(reader, 0)
+    assert HOSTILE in reader.metadata.title
+    assert HOSTILE in [item.title for item in reader.outline if not isinstance(item, list)]
+
+
+def test_metadata_tags_and_fonts(made):
+    _, data, reader, _ = made
+    root = reader.trailer["/Root"]
+    assert (
+        root["/MarkInfo"]["/Marked"]
+        and root["/Lang"] == "en"
+        and reader.metadata.author.startswith("backdrive-bayes")
+    )
+    assert b"<pdfuaid:part>1</pdfuaid:part>" in root["/Metadata"].get_data()
+    assert "/CreationDate" not in reader.metadata
+    for page in reader.pages:
+        for font in page["/Resources"].get("/Font", {}).values():
+            descendant = (
+                font.get_object()["/DescendantFonts"][0]
+                if "/DescendantFonts" in font.get_object()
+                else font.get_object()
+            )
+            descriptor = descendant.get_object()["/FontDescriptor"].get_object()
+            assert {"/FontFile", "/FontFile2", "/FontFile3"} & set(descriptor)
+
+
+def test_details_name_seed_versions_priors_and_reconstructed_equations(made):
+    text = text_of(made[2])
+    for needed in (
+        "Seed 7",
+        "numpy 2.0",
+        "log-normal, median",
+        "eq. (20), reconstructed",
+        "10.1177/00202940261442382",
+    ):
+        assert needed in text
+
+
+def test_figures_stay_text_and_vector(made):
+    reader = made[2]
+    assert "residual" in text_of(reader) and "settled loop, rising" in text_of(reader)
+    assert not any(page.images for page in reader.pages)
+
+
+def test_the_same_results_give_the_same_bytes(made):
+    assert report.report_bytes([made[3]]) == made[1]
+
+
+def test_not_converged_is_inconclusive_with_advice(tmp_path):
+    bad = indicators(1)["convergence"] | {"converged": False, "advice": "give it more time", "max_rhat": None}
+    write_result(tmp_path, records=1, convergence=bad)
+    (tmp_path / "posterior.nc").unlink()
+    page = text_of(pypdf.PdfReader(report.write_report([tmp_path], tmp_path / "out" / "r.pdf")), 0)
+    assert "INCONCLUSIVE" in page and "give it more time" in page and "Do not use" in page
+
+
+def test_the_summary_stays_on_one_page_whatever_the_unit_says(tmp_path):
+    identity = {f"key {i}": "word " * 30 for i in range(6)} | {
+        "control": "a\x00b\x1b[31m\u202ec\ue000d",
+        "cjk": "減速機",
+    }
+    write_result(tmp_path, records=3, unit="A" * 300, identity=identity)
+    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path])))
+    assert "Signature" in text_of(reader, 0) and "Module decomposition" in text_of(reader, 1)
+    assert r"a\u{0}b\u{1B}[31m\u{202E}c\u{E000}d" in text_of(reader, 0).replace("\u200b", "")
+
+
+def test_least_squares_stand_beside_the_posterior(tmp_path):
+    records = indicators(1)["records"]
+    branch = {"r_squared": 0.9991, "rms_rad": 3e-4, "rms_high_load_over_rest": None}
+    records[0]["least_squares"] = {"branches": {"ascending": branch}, "indicators": {"loop_area_J": 3.02e-4}}
+    records[0]["indicators"]["lost_motion_rad"] = None
+    write_result(tmp_path, records=1)
+    result = json.loads((tmp_path / "indicators.json").read_text()) | {"records": records}
+    (tmp_path / "indicators.json").write_text(json.dumps(result))
+    (tmp_path / "posterior.nc").unlink()
+    text = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path]))))
+    assert "0.3630 [0.3612, 0.3648] 0.3020" in text and "R² = 0.9991" in text and "not defined" in text
+
+
+def test_several_folders_make_one_report_with_a_summary_each(tmp_path):
+    for name in ("a", "b"):
+        write_result(tmp_path / name, records=1, unit=f"unit {name}")
+        (tmp_path / name / "posterior.nc").unlink()
+    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path / "a", tmp_path / "b"])))
+    assert "unit a" in text_of(reader, 0) and "unit b" in text_of(reader, 1)
+    assert reader.metadata.title == "Backdrivability report: unit a, unit b"
+
+
+def test_folders_without_results_and_broken_results_are_one_clear_line(tmp_path):
+    with pytest.raises(BadInput, match="none of them"):
+        report.report_bytes([tmp_path])
+    with pytest.raises(BadInput, match="no such folder"):
+        report.report_bytes([tmp_path / "missing"])
+    write_result(tmp_path, records=1)
+    broken = indicators(1)
+    del broken["records"][0]["torque_energy"]
+    (tmp_path / "indicators.json").write_text(json.dumps(broken))
+    with pytest.raises(BadInput, match="complete result file"):
+        report.write_report([tmp_path], tmp_path / "r.pdf")
+    assert not list(tmp_path.glob("*.pdf"))
+
+
+def test_without_typst_the_message_names_the_extra(monkeypatch, tmp_path):
+    monkeypatch.setitem(__import__("sys").modules, "typst", None)
+    with pytest.raises(MissingExtra, match=r"backdrive-bayes\[report\]"):
+        report.report_bytes([tmp_path])
+
+
+def test_the_verb_writes_into_the_first_folder_or_into_out(tmp_path, capsys):
+    from argparse import Namespace
+
+    from backdrive_bayes.commands.report import run
+
+    write_result(tmp_path / "a", records=1)
+    (tmp_path / "a" / "posterior.nc").unlink()
+    assert run(Namespace(results=[tmp_path / "a"], out=None)) == 0
+    assert (tmp_path / "a" / "report.pdf").exists() and (tmp_path / "a" / "indicators.json").exists()
+    assert run(Namespace(results=[tmp_path / "a"], out=tmp_path / "b")) == 0
+    assert (tmp_path / "b" / "report.pdf").read_bytes() == (tmp_path / "a" / "report.pdf").read_bytes()
+    assert "report.pdf" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("median", "lo", "hi", "shown"),
+    [
+        (32.68, 32.38, 32.98, "32.7 [32.4, 33.0]"),
+        (0.5, -0.25, 1.2, "0.5 [−0.2, 1.2]"),
+        (1234.5, 1200.0, 1270.0, "1234 [1200, 1270]"),
+        (0.0015, 0.0015, 0.0015, "0.00150 [0.00150, 0.00150]"),
+        (0.0, 0.0, 0.0, "0.000 [0.000, 0.000]"),
+    ],
+)
+def test_value_and_interval_share_sensible_decimals(median, lo, hi, shown):
+    assert interval_text({"median": median, "lo": lo, "hi": hi}) == shown
+
+
+def test_numbers_in_words():
+    assert interval_text(None) == "not defined" and significant(None) == "not defined"
+    assert significant(0.0999977) == "0.100" and significant(1.2e-9, 2) == "1.2e−09"
+    assert percent(0.913) == "91 %" and percent(None) == "–"
+    assert prior_text("log-normal, median 0.01, log-sd 1.5", ARCMIN) == "log-normal, median 34.38, log-sd 1.5"
+    assert prior_text("half-Cauchy 3", 2.0) == "half-Cauchy 3 (SI units)"
+    assert printable("f" * 64) == "f" * 64 and "\u200b" in printable("x" * 64)

@@ -1,0 +1,164 @@
+"""A small result folder written by hand: what `fit` saves, without a fit."""
+
+import json
+
+import numpy as np
+import xarray
+
+GROUP_ATTRIBUTES = {
+    "schema": "backdrive-bayes/posterior/1",
+    "unit": "u",
+    "data_sha256": "0123456789abcdef" * 4,
+    "modules": "geometric,elastic,friction",
+    "rated_torque_nm": 0.1,
+    "seed": 7,
+    "inference_library": "emcee",
+    "inference_library_version": "3.1.6",
+    "versions": "backdrive-bayes 0.1.0; numpy 2.0; Python 3.11",
+}
+PARAMETERS = {"clearance": ("rad", 0.039), "drag_torque": ("N·m", 0.004), "friction_ratio": ("1", 0.05)}
+RATES = (0.01, 0.05, 0.1)
+CHAINS, DRAWS, BLOCKS = 3, 60, 30
+
+
+def write_result(folder, records=2, **changes):
+    """Write indicators.json and posterior.nc of some records into ``folder`` and return the JSON object."""
+    folder.mkdir(parents=True, exist_ok=True)
+    result = indicators(records) | changes
+    (folder / "indicators.json").write_text(json.dumps(result), encoding="utf-8")
+    _write_posterior(folder / "posterior.nc", records)
+    return result
+
+
+def interval(value, spread=0.01):
+    return {"median": value, "lo": value * (1 - spread), "hi": value * (1 + spread)}
+
+
+def branch(torque, direction):
+    return 0.02 * np.tanh(300 * (torque - direction * 0.003)) + 0.15 * torque
+
+
+def indicators(records):
+    parameters = {
+        k: interval(v) | {"unit": u, "prior": "log-normal, median 0.01, log-sd 1"}
+        for k, (u, v) in PARAMETERS.items()
+    }
+    for r in range(records):
+        about = {"median": 0.1, "lo": -0.9, "hi": 0.9, "unit": "1", "prior": "uniform on [-1, 1]"}
+        parameters[f"initial_gap_position[{r}]"] = about
+    return {
+        "schema": "backdrive-bayes/indicators/1",
+        "unit": "u",
+        "k": 0.03,
+        "level": 0.9,
+        "model": {"modules": ["geometric", "elastic", "friction"], "effects": []},
+        "convergence": {
+            "converged": True,
+            "max_rhat": 1.004,
+            "min_bulk_ess": 1500.0,
+            "min_tail_ess": 1200.0,
+            "seconds": 4.0,
+            "worst": "initial_gap_position[0]",
+            "advice": "",
+        },
+        "model_error": {"scale_rad": 6e-4},
+        "parameters": parameters,
+        "records": [_record(r) for r in range(records)],
+    }
+
+
+def _record(r):
+    torque = np.linspace(-0.1, 0.1, 41)
+    rising, falling = branch(torque, 1), branch(torque, -1)
+    positive = np.linspace(0, 0.1, 21)
+    energy = 0.03 * np.exp(-(((positive - 0.004) / 0.004) ** 2)) + 1e-3
+    share = {"model_error_share": 0.91}
+    return {
+        "file": f"record-{r}",
+        "loading_rate_Nm_per_s": RATES[r % 3] * 10 ** (r // 3),
+        "amplitude_Nm": 0.1,
+        "indicators": {
+            "lost_motion_rad": interval(0.0095) | share,
+            "zero_torque_width_rad": interval(0.0292, 0.006) | share,
+            "peak_angle_rad": interval(0.03254 + 1e-4 * r, 0.001) | share,
+            "loop_area_J": interval(3.63e-4, 0.005) | share,
+            "absorbed_J": interval(1.55e-3, 0.005) | share,
+            "dissipation_ratio": interval(0.2343, 0.006) | share,
+        },
+        "loop": {
+            "torque_Nm": torque.tolist(),
+            "rising_rad": _band(rising),
+            "falling_rad": _band(falling),
+        },
+        "mechanism": {
+            "S_g_J": interval(2.7e-4),
+            "S_f_J": interval(9e-5),
+            "S_g_over_S": interval(0.74),
+            "S_f_over_S": interval(0.25),
+        },
+        "modules": {
+            "geometric": _curves(rising - 0.15 * torque, falling - 0.15 * torque),
+            "elastic": _curves(0.15 * torque, 0.15 * torque),
+        },
+        "torque_energy": {
+            "torque_Nm": positive.tolist(),
+            "median_J_per_Nm": energy.tolist(),
+            "lo": (0.95 * energy).tolist(),
+            "hi": (1.05 * energy).tolist(),
+            "tau1_Nm": interval(0.002),
+            "tau2_Nm": interval(0.008),
+        },
+        "by_amplitude": {
+            "amplitude_Nm": [0.025, 0.05, 0.075, 0.1],
+            "loop_area_J": [interval(1e-4 * (i + 1)) for i in range(4)],
+            "dissipation_ratio": [interval(0.5 / (i + 1)) for i in range(4)],
+            **{
+                f"{f}_{q}": interval(v)
+                for q, v in (("S_J", 2e-4), ("u", 0.3))
+                for f in ("max", "min", "mean")
+            },
+        },
+        "back_drive": {"load_Nm": 0.1, "theta_L_rad": interval(0.047), "W_L_J": interval(7.7e-4)},
+        "noise": {"white_rad": 3e-5, "correlated_rad": 7e-5, "correlation_time_s": 0.026, "torque_Nm": 1e-4},
+    }
+
+
+def _band(curve):
+    return {"median": curve.tolist(), "lo": (curve - 1e-4).tolist(), "hi": (curve + 1e-4).tolist()}
+
+
+def _curves(rising, falling):
+    return {"rising_rad": rising.tolist(), "falling_rad": falling.tolist()}
+
+
+def _write_posterior(path, records):
+    rng = np.random.default_rng(1)
+    legs = (("first", 0.0, 0.1), ("down", 0.1, -0.1), ("up", -0.1, 0.1))
+    torque = np.concatenate([np.linspace(a, b, BLOCKS) for _, a, b in legs])
+    sign = np.repeat([1, -1, 1], BLOCKS)
+    angle = np.where(sign > 0, branch(torque, 1), branch(torque, -1)) + 0.5
+    n = torque.size
+    noise = 2e-4 * rng.standard_normal((CHAINS, 20, records * n))
+    shared = {
+        k: (("chain", "draw"), v * np.exp(0.05 * rng.standard_normal((CHAINS, DRAWS))))
+        for k, (_, v) in PARAMETERS.items()
+    }
+    groups = {
+        "posterior": shared
+        | {"offset": (("chain", "draw", "record"), np.full((CHAINS, DRAWS, records), 0.5))},
+        "sample_stats": {"lp": (("chain", "draw"), rng.standard_normal((CHAINS, DRAWS)))},
+        "posterior_predictive": {"angle_rad": (("chain", "draw", "block"), np.tile(angle, records) + noise)},
+        "observed_data": {
+            "angle_rad": (("block",), np.tile(angle, records) + 2e-4 * rng.standard_normal(records * n))
+        },
+        "constant_data": {
+            "torque_nm": (("block",), np.tile(torque, records)),
+            "leg": (("block",), np.tile(np.repeat([0, 1, 2], BLOCKS), records)),
+            "block_record": (("block",), np.repeat(np.arange(records), n)),
+            "turning_nm": (("turn",), np.tile([0.0, 0.1, -0.1, 0.1], records)),
+            "turning_record": (("turn",), np.repeat(np.arange(records), 4)),
+        },
+    }
+    for i, (name, variables) in enumerate(groups.items()):
+        data = xarray.Dataset(variables, attrs=GROUP_ATTRIBUTES)
+        data.to_netcdf(path, mode="a" if i else "w", group=name, engine="h5netcdf")
