@@ -96,15 +96,20 @@ def _refine(problem, optimum) -> Prepared:
     discrepancy = learn_discrepancy(problem, optimum)
     angles = [problem.model.angle(problem.values(optimum.z, r), d.path) for r, d in enumerate(problem.records)]
     slopes = [_slope(d.blocks, angle) for d, angle in zip(problem.records, angles, strict=True)]
-    noise = refine_noise(problem, optimum.z, discrepancy, slopes)
+    noise, path_sd = refine_noise(problem, optimum.z, discrepancy, slopes)
     records = tuple(
-        RecordData.prepare(d.blocks, n, s, d.path) for d, n, s in zip(problem.records, noise, slopes, strict=True)
+        RecordData.prepare(_with_path_error(d.blocks, path_sd), n, s, d.path)
+        for d, n, s in zip(problem.records, noise, slopes, strict=True)
     )
     problem = replace(problem, records=records)
     optimum = find_optimum(problem, [optimum.z])
     discrepancy = learn_discrepancy(problem, optimum)
     problem = replace(problem, misfit=discrepancy.misfit)
     return Prepared(problem, find_optimum(problem, [optimum.z]), discrepancy)
+
+
+def _with_path_error(blocks, path_sd):
+    return replace(blocks, torque_variance_nm2=np.maximum(blocks.torque_variance_nm2, path_sd**2))
 
 
 def _slope(blocks, angle):

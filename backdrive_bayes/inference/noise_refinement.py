@@ -21,8 +21,9 @@ from backdrive_bayes.records.noise import NoiseEstimate
 RECORDS_USED = 3
 
 
-def refine_noise(problem: Problem, z, discrepancy: Discrepancy, slopes) -> tuple[NoiseEstimate, ...]:
-    """Noise of every record with correlated level and correlation time refined on the longest records.
+def refine_noise(problem: Problem, z, discrepancy: Discrepancy, slopes):
+    """Noise of every record with correlated level and correlation time refined on the longest records, and an extra
+    standard deviation [N·m] of the torque path that the residuals on steep branches ask for.
 
     ``slopes`` holds dθ/dτ at the blocks of each record, shape (blocks,) each.
     """
@@ -35,19 +36,21 @@ def refine_noise(problem: Problem, z, discrepancy: Discrepancy, slopes) -> tuple
         [0.0, first.correlation_time_s_sd / first.correlation_time_s],
     ])
     precision = np.linalg.inv(width @ _correlation(first) @ width)
-    start = np.r_[centre, np.log(max(discrepancy.scale_rad, 1e-3 * first.correlated_rad))]
+    torque_scale = 1e-3 * problem.model.scale.torque_nm
+    start = np.r_[centre, np.log(max(discrepancy.scale_rad, 1e-3 * first.correlated_rad)), np.log(0.1 * torque_scale)]
 
     def cost(theta):
         step = theta[:2] - centre
+        path = 0.5 * (np.exp(theta[3]) / torque_scale) ** 2
         noise = replace(first, correlated_rad=float(np.exp(theta[0])), correlation_time_s=float(np.exp(theta[1])))
-        return 0.5 * step @ precision @ step + sum(t.cost(noise, np.exp(2 * theta[2])) for t in terms)
+        return 0.5 * step @ precision @ step + path + sum(t.cost(noise, *np.exp(2 * theta[2:])) for t in terms)
 
-    bounds = [(c - 2.5, c + 2.5) for c in start[:2]] + [(start[2] - 6, start[2] + 3)]
+    bounds = [(c - 2.5, c + 2.5) for c in start[:2]] + [(start[2] - 6, start[2] + 3), (start[3] - 3, start[3] + 5)]
     best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 25, "eps": 1e-3, "ftol": 1e-6})
     sd = np.sqrt(np.diag(np.linalg.pinv(_curvature(cost, best.x), hermitian=True)))[:2]
     correlated, correlation = (float(v) for v in np.exp(best.x[:2]))
     dof = float(np.clip(2.0 / max((2 * sd[0]) ** 2, 1e-9), 4.0, 1e5))
-    return tuple(
+    refined = tuple(
         replace(
             d.noise,
             correlated_rad=correlated,
@@ -58,6 +61,7 @@ def refine_noise(problem: Problem, z, discrepancy: Discrepancy, slopes) -> tuple
         )
         for d in problem.records
     )
+    return refined, float(np.exp(best.x[3]))
 
 
 def _correlation(noise):
@@ -80,8 +84,9 @@ class _Term:
         self.rough = (basis * deviation) @ (basis * deviation).T * discrepancy.relative[record] ** 2
         self.fixed = jacobian @ jacobian.T + np.ptp(self.data.blocks.angle_rad) ** 2
 
-    def cost(self, noise, variance):
+    def cost(self, noise, variance, path_variance):
         covariance = block_covariance(self.data.blocks, noise, self.slope) + self.fixed + variance * self.rough
+        covariance[np.diag_indices_from(covariance)] += self.slope**2 * path_variance
         lower = cholesky(covariance, lower=True, check_finite=False)
         white = solve_triangular(lower, self.residual, lower=True, check_finite=False)
         return 0.5 * white @ white + np.log(np.diag(lower)).sum()

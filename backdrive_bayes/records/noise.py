@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 PRIOR_CORRELATION_TIME_S = 0.03
-PRIOR_LOG_SD = 0.8
+PRIOR_LOG_SD = 0.5
 WINDOWS_PER_SEGMENT = 16
 TREND_DEGREE = 3
 
