@@ -1,0 +1,1 @@
+"""Bayesian inference of a robot reducer's geometric error, stiffness and friction from torque-angle loops."""

@@ -13,7 +13,9 @@ from backdrive_bayes.errors import BadInput, MissingExtra
 VERBS = {
     "check": "check",
     "fit": "fit",
+    "predict": "predict",
     "report": "report",
+    "demo": "demo",
 }
 _DESCRIPTION = (
     "Bayesian inference of a robot reducer's geometric error, stiffness and friction from torque-angle loops."

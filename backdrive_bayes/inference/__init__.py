@@ -1,0 +1,1 @@
+"""From records and model to a posterior: likelihood, mode, discrepancy, sampling, files."""

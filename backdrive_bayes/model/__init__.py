@@ -1,0 +1,1 @@
+"""The reducer model: parameters, play operators, modules and their registry."""

@@ -1,0 +1,1 @@
+"""From files to records: reading, judging, cutting into branches, noise, reduction to blocks."""

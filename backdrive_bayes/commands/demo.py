@@ -1,0 +1,36 @@
+"""`demo`: the whole way on the packaged twins, ending in a PDF."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from backdrive_bayes.commands import check, fit, report
+from backdrive_bayes.commands.output import say
+from backdrive_bayes.errors import BadInput
+
+HELP = "check and fit the packaged twins and write one PDF"
+UNITS = ("reducer-1", "reducer-2")
+
+
+def add_arguments(parser) -> None:
+    """Options of this verb."""
+    parser.add_argument("--data", type=Path, default=Path("data"), help="folder of the packaged units (default data)")
+
+
+def run(args) -> int:
+    """Run check and fit on every packaged unit, then the report; the worst exit code of the fits."""
+    out = args.out or Path("reports/demo")
+    if not (args.data / UNITS[0]).is_dir():
+        raise BadInput(args.data, "the folder of packaged units (run from the project's folder or give --data)", "none")
+    say("The packaged units are synthetic twins of published reducers, not measurements.")
+    check.run(Namespace(unit=args.data / "ugly", out=out / "ugly-check", seed=args.seed))
+    codes, results = [], []
+    for name in UNITS:
+        folder = out / name
+        check.run(Namespace(unit=args.data / name, out=folder, seed=args.seed))
+        defaults = {"baseline": "geometric,elastic,friction", "k": 0.03, "level": 0.9, "budget": 300.0}
+        codes.append(fit.run(Namespace(unit=args.data / name, out=folder, seed=args.seed, no_figures=False, **defaults)))
+        results.append(folder)
+    report.run(Namespace(results=results, out=out, seed=args.seed))
+    return max(codes)
