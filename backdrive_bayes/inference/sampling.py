@@ -15,8 +15,8 @@ from emcee.moves import DEMove, Move
 from backdrive_bayes.inference.proposal import StudentMixture, effective_share, fit_mixture, importance, temper
 
 PARTS = (1, 4)
-WORTHWHILE = 1.5
-"""By how much a refitted proposal must be better for the draws made so far to be given up."""
+WORTHWHILE = 0.5
+"""By how many nats a draw a refitted proposal must be better for the draws made so far to be given up."""
 
 
 class IndependenceMove(Move):
@@ -51,7 +51,7 @@ class Settings:
     walkers: int = 64
     block: int = 60
     warm_up_blocks: int = 10
-    refits: int = 3
+    refits: int = 8
     kept_per_ensemble: int = 1000
     max_seconds: float = 120.0
     good_share: float = 0.15
@@ -87,18 +87,22 @@ def warm_up(log_posterior, mode, covariance, rng, settings: Settings):
             break
         sampler.reset()
         state = sampler.run_mcmc(state, settings.block, skip_initial_state_check=True)
-        history.append(sampler.get_chain(thin=4, flat=True))
-        proposal, share = _refit(log_posterior, np.concatenate(history[len(history) // 2 :]), rng)
+        history.append(sampler.get_chain(thin=4))
+        recent = np.concatenate(history[len(history) // 2 :])
+        one, other = (recent[:, half].reshape(-1, mode.size) for half in (slice(None, None, 2), slice(1, None, 2)))
+        proposal, _ = _refit(one, other, rng)
+        proposal, share = _polish(log_posterior, proposal, rng, rounds=1)
         best = state.coords[np.argmax(state.log_prob)]
     return proposal, best
 
 
-def _refit(log_posterior, draws, rng):
-    """The best mixture fitted to ``draws`` and its effective importance share."""
-    draws = draws[rng.permutation(draws.shape[0])[:2500]]
-    even = np.full(draws.shape[0], 1 / draws.shape[0])
-    tried = [_polish(log_posterior, fit_mixture(draws, even, rng, parts), rng, rounds=1) for parts in PARTS]
-    return max(tried, key=lambda pair: pair[1])
+def _refit(fitted, held_out, rng):
+    """The mixture fitted to draws (n, dimension) that held-out walkers find most likely, and their mean log density."""
+    fitted = fitted[rng.permutation(fitted.shape[0])[:3000]]
+    even = np.full(fitted.shape[0], 1 / fitted.shape[0])
+    tried = [fit_mixture(fitted, even, rng, parts) for parts in PARTS]
+    scores = [float(np.mean(q.log_density(held_out))) for q in tried]
+    return tried[int(np.argmax(scores))], max(scores)
 
 
 def _polish(log_posterior, proposal, rng, rounds: int = 3, n: int = 1024):
@@ -137,12 +141,15 @@ def run_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settin
         if enough(drawn) or out_of_time():
             return drawn
         steps = max(steps, drawn.steps // 2)
-        if refits_left:
+        chains = [s.get_chain(flat=True) for s in samplers]
+        held_out = np.concatenate(chains[1::2])
+        held_out = held_out[:: max(1, held_out.shape[0] // 3000)]
+        better, score = _refit(np.concatenate(chains[::2]), held_out, rng)
+        # How likely the proposal finds the chain's own draws tells of regions that it misses; importance weights cannot.
+        if refits_left and score > float(np.mean(proposal.log_density(held_out))) + WORTHWHILE:
             refits_left -= 1
-            better, share = _refit(log_posterior, np.concatenate([s.get_chain(flat=True) for s in samplers]), rng)
-            if share > WORTHWHILE * _polish(log_posterior, proposal, rng, rounds=1)[1]:
-                proposal = better
-                samplers, states = _begin(log_posterior, proposal, states, rng, settings)
+            proposal = better
+            samplers, states = _begin(log_posterior, proposal, states, rng, settings)
 
 
 def _begin(log_posterior, proposal, states, rng, settings):

@@ -16,7 +16,8 @@ class Geometric:
 
     The rising boundary is (c/2)[(1-e) tanh((τ-τ_d)/s) + e tanh((τ+τ_e)/s)], the falling one its mirror image. With e = 0 and
     a saturated loop these are the branches A tanh(Bτ ∓ D) of eq. (20), reconstructed, with A = c/2, B = 1/s,
-    D = τ_d/s. The share e of the clearance springs back already when the torque has fallen to τ_e.
+    D = τ_d/s. The share e of the clearance springs back already when the torque has fallen to τ_e. The initial position runs from
+    -1 to 1 between the boundaries at the first torque.
     """
 
     name = "geometric"
@@ -42,6 +43,8 @@ class Geometric:
             engaged += share * (np.tanh((torque + release) / width) - engaged)
             return engaged
 
-        gap = play(drive.path, rising, values["initial_gap_position"])
+        start = np.array([drive.path.start_torque_nm])
+        low, high = rising(start), -rising(-start)
+        gap = play(drive.path, rising, low + 0.5 * (1 + values["initial_gap_position"]) * (high - low))
         gap *= 0.5 * values["clearance"]
         return gap
