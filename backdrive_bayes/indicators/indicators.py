@@ -48,17 +48,14 @@ def dissipation_ratio(loops: Loops) -> np.ndarray:
     return loop_area_j(loops) / absorbed_j(loops)
 
 
-def torque_energy(loops: Loops, points: int = 101):
+def torque_energy(loops: Loops):
     """The torque–energy curve: |τ| (points,) [N·m] and w averaged over ±τ, J per N·m of torque, shape (draws, points).
 
-    Source: eq. (26)-(27), reconstructed.
+    The points are the loop's own, dense near zero torque. Source: eq. (26)-(27), reconstructed.
     """
-    torque = np.linspace(0, loops.torque_nm[-1], points)
-    index = np.clip(np.searchsorted(loops.torque_nm, torque), 1, loops.torque_nm.size - 1)
-    low, high = loops.torque_nm[index - 1], loops.torque_nm[index]
-    share = (torque - low) / (high - low)
+    centre = loops.torque_nm.size // 2
     mirrored = 0.5 * (loops.width + loops.width[:, ::-1])
-    return torque, (1 - share) * mirrored[:, index - 1] + share * mirrored[:, index]
+    return loops.torque_nm[centre:], mirrored[:, centre:]
 
 
 def hump_torques_nm(torque, curve):
@@ -67,22 +64,28 @@ def hump_torques_nm(torque, curve):
     τ₁ is where the curve has risen half-way from its valley at low torque to its hump, τ₂ where it has fallen half-way from the
     hump to its lowest value beyond (our convention).
     """
-    n = curve.shape[1]
-    index = np.arange(n)
+    index = np.arange(curve.shape[1])
     hump = np.argmax(curve, axis=1)[:, None]
     top = np.take_along_axis(curve, hump, axis=1)
     before, after = index <= hump, index >= hump
     valley = np.min(np.where(before, curve, np.inf), axis=1, keepdims=True)
     foot = np.min(np.where(after, curve, np.inf), axis=1, keepdims=True)
-    risen = before & (curve >= 0.5 * (valley + top))
     # The last stretch below half before the hump decides, so that ripples at low torque do not.
-    below = np.where(before & ~risen, index, -1).max(axis=1)
-    fallen = after & (curve <= 0.5 * (foot + top))
-    beyond = np.where(fallen.any(axis=1), np.argmax(fallen, axis=1), n - 1)
-    step = torque[1] - torque[0]
-    tau1 = np.where(below < 0, 0.0, torque[np.minimum(below + 1, n - 1)] - 0.5 * step)
-    tau2 = np.where(beyond == hump[:, 0], torque[beyond], torque[beyond] - 0.5 * step)
-    return tau1, tau2
+    below = np.where(before & (curve < 0.5 * (valley + top)), index, -1).max(axis=1)
+    fallen = after & (curve <= 0.5 * (foot + top)) & (index > hump)
+    beyond = np.where(fallen.any(axis=1), np.argmax(fallen, axis=1), index[-1])
+    tau1 = np.where(below < 0, 0.0, _crossing(torque, curve, below, 0.5 * (valley + top)[:, 0]))
+    tau2 = _crossing(torque, curve, np.maximum(beyond - 1, 0), 0.5 * (foot + top)[:, 0])
+    return tau1, np.where(hump[:, 0] == index[-1], torque[-1], tau2)
+
+
+def _crossing(torque, curve, left, level):
+    """Torque between points ``left`` and ``left + 1`` at which each curve passes ``level``."""
+    left = np.clip(left, 0, torque.size - 2)
+    row = np.arange(curve.shape[0])
+    a, b = curve[row, left], curve[row, left + 1]
+    share = np.clip((level - a) / np.where(a == b, 1.0, b - a), 0.0, 1.0)
+    return torque[left] + share * (torque[left + 1] - torque[left])
 
 
 def back_drive(loops: Loops, load_nm: float):

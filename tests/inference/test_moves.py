@@ -8,7 +8,7 @@ from support.targets import Banana, agrees, along_the_ridge, disagreement, momen
 
 from backdrive_bayes.inference.sampling import IndependenceMove, Settings, run_ensembles, warm_up
 
-ENSEMBLES, WALKERS = 10, 64
+ENSEMBLES, WALKERS = 8, 64
 RIDGE = along_the_ridge()
 
 
@@ -78,7 +78,7 @@ WRONG = {"no density correction": Uncorrected(RIDGE), "shrinking step": Shrinkin
 
 @pytest.mark.parametrize("move", WRONG.values(), ids=WRONG)
 def test_wrong_move_is_found_out(move, truth):
-    assert not agrees(sampled([(move, 1.0)], 800), *truth)
+    assert not agrees(sampled([(move, 1.0)], 400), *truth)
 
 
 def run(seed, walkers=WALKERS):

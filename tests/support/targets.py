@@ -56,7 +56,7 @@ def disagreement(draws, mean, sd):
     return np.abs(pulls), np.abs(errors)
 
 
-def agrees(draws, mean, sd, pull=5.0, slack=0.02):
+def agrees(draws, mean, sd, pull=5.0, slack=0.03):
     """Whether every moment is within its Monte-Carlo error (or a ``slack`` of a standard deviation)."""
     pulls, errors = disagreement(draws, mean, sd)
     return bool(((pulls < pull) | (errors < 0.25 * slack)).all() and (errors < slack + 1e-12).all())

@@ -1,0 +1,132 @@
+"""Fit the eleven measured cycloidal units: convergence, preload trends, and small loops predicted from the large ones.
+
+    python studies/real_loops.py --data ../shared/data/cycloidal --out reports/real-loops
+
+Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import json
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from backdrive_bayes.indicators.summary import indicators_json, monitored
+from backdrive_bayes.inference.fit import fit
+from backdrive_bayes.inference.posterior_file import write_posterior
+from backdrive_bayes.inference.predict import predict_angles
+from backdrive_bayes.inference.sampling import Settings
+from backdrive_bayes.records.history import noise_free_torque
+from backdrive_bayes.records.unit_folder import read_unit
+
+K = 0.03
+CREDIT = "github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0"
+
+
+def study_unit(job) -> dict:
+    """Fit all loops, then the large ones alone, and predict the small ones from those."""
+    warnings.simplefilter("ignore")
+    folder, out, budget = job
+    unit = read_unit(folder)
+    settings = Settings(max_seconds=budget)
+    posterior = fit(unit, seed=1, settings=settings, quantities=monitored(K))
+    result = {"unit": unit.name, "all": _brief(posterior)}
+    draws = {}
+    for name in ("clearance", "friction_torque", "friction_ratio", "drag_torque"):
+        i = posterior.problem.labels.index(name)
+        draws[name] = posterior.problem.physical(posterior.z)[::4, i].tolist()
+    widths = [r for r in indicators_json(posterior, K)["records"]]
+    result["indicators"] = [{"file": r["file"], **r["indicators"]} for r in widths]
+    result["draws"] = draws
+    large = replace(unit, records=tuple(r for r in unit.records if r.name.startswith("large")))
+    alone = fit(large, seed=2, settings=settings, quantities=monitored(K))
+    result["large_only"] = _brief(alone)
+    path = out / f"{unit.name}.nc"
+    write_posterior(alone, path)
+    result["small_predicted"] = _predict_small(unit, alone, path)
+    path.unlink()
+    return result
+
+
+def _brief(posterior):
+    return posterior.convergence.to_json() | {"discrepancy_rad": posterior.discrepancy.scale_rad}
+
+
+def _predict_small(unit, posterior, path):
+    if not posterior.converged:
+        return None
+    hits, total, width, gap = 0, 0, [], []
+    for record in (r for r in unit.records if r.name.startswith("small")):
+        pick = slice(None, None, 4)
+        torque, _ = noise_free_torque(record.time_s[pick], record.torque_nm[pick])
+        curves = predict_angles(path, record.time_s[pick], torque, rng=np.random.default_rng(3))
+        lo, hi = np.quantile(curves, [0.05, 0.95], axis=0)
+        measured = record.angle_rad[pick]
+        hits += int(np.sum((measured >= lo) & (measured <= hi)))
+        total += measured.size
+        width.append(float(np.mean(hi - lo)))
+        gap.append(float(np.sqrt(np.mean((np.median(curves, axis=0) - measured) ** 2))))
+    return {"coverage_of_90": hits / total, "mean_width_rad": float(np.mean(width)), "rms_rad": float(np.mean(gap))}
+
+
+def trends(results) -> list[dict]:
+    """Probability that a parameter rises or falls from each preload to the next, from independent posteriors."""
+    by_name, rows = {r["unit"]: r for r in results}, []
+    for family in (("conic-preload-1", "conic-preload-2", "conic-preload-4"), ("split-preload-0", "split-preload-1", "split-preload-2")):
+        for low, high in (family[:2], family[1:], family[::2]):
+            if not (low in by_name and high in by_name and by_name[low]["all"]["converged"] and by_name[high]["all"]["converged"]):
+                rows.append({"from": low, "to": high, "inconclusive": "one of the two has not converged"})
+                continue
+            row = {"from": low, "to": high}
+            for name, sign in (("clearance", -1), ("friction_torque", 1), ("friction_ratio", 1)):
+                a, b = (np.array(by_name[u]["draws"][name]) for u in (low, high))
+                n = min(a.size, b.size)
+                row[f"P({name} {'rises' if sign > 0 else 'falls'})"] = float(np.mean(sign * (b[:n] - a[:n]) > 0))
+                row[f"median {name}"] = [float(np.median(a)), float(np.median(b))]
+            for name, sign in (("zero_torque_width_rad", -1), ("loop_area_J", 1)):
+                row[f"P({name} {'rises' if sign > 0 else 'falls'}), loops"] = _loop_trend(by_name[low], by_name[high], name, sign)
+            rows.append(row)
+    return rows
+
+
+def _loop_trend(low, high, name, sign):
+    """Share of pairs of large loops of the two units that order as claimed: replicates, no model."""
+    values = [[r[name]["median"] for r in u["indicators"] if r["file"].startswith("large")] for u in (low, high)]
+    return float(np.mean([sign * (b - a) > 0 for a in values[0] for b in values[1]]))
+
+
+def main():
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=Path("../shared/data/cycloidal"))
+    parser.add_argument("--out", type=Path, default=Path("reports/real-loops"))
+    parser.add_argument("--budget", type=float, default=200.0)
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    folders = sorted(p.parent for p in options.data.glob("*/unit.toml"))
+    results = []
+    with ProcessPoolExecutor(options.workers) as pool:
+        for result in pool.map(study_unit, [(f, options.out, options.budget) for f in folders]):
+            results.append(result)
+            print(result["unit"], {k: result["all"][k] for k in ("converged", "max_rhat", "min_tail_ess", "seconds")},
+                  "large only", result["large_only"]["converged"], "small predicted", result["small_predicted"], flush=True)
+    rows = trends(results)
+    for row in rows:
+        print(row)
+    for result in results:
+        del result["draws"]
+    (options.out / "real_loops.json").write_text(json.dumps({"credit": CREDIT, "units": results, "trends": rows}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""indicators.json of a brief fit: complete, finite, and consistent with itself."""
+
+import json
+
+import pytest
+from support.bench import unit_of
+from support.known import RATED, SCALE
+
+from backdrive_bayes.indicators.summary import indicators_json
+from backdrive_bayes.inference.fit import fit
+from backdrive_bayes.inference.sampling import Settings
+
+K = 0.6
+
+
+def intervals(node):
+    """All intervals inside a JSON object."""
+    if isinstance(node, dict):
+        if {"median", "lo", "hi"} <= set(node):
+            yield node
+        for value in node.values():
+            yield from intervals(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from intervals(value)
+
+
+@pytest.fixture(scope="module")
+def result():
+    unit = unit_of(6, rate=0.05, amplitudes=(RATED, 0.5 * RATED))
+    settings = Settings(max_seconds=0.0, block=30, kept_per_ensemble=300)
+    return indicators_json(fit(unit, seed=1, settings=settings, scale=SCALE), K)
+
+
+def test_it_is_strict_json(result):
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+
+
+def test_intervals_are_in_order(result):
+    found = [i for i in intervals(result) if not isinstance(i["median"], list)]
+    assert len(found) > 30
+    assert all(i["lo"] <= i["median"] <= i["hi"] for i in found)
+
+
+def test_k_is_reported_and_lost_motion_beyond_a_small_loop_is_null(result):
+    assert result["k"] == K
+    large, small = (r["indicators"] for r in result["records"])
+    assert large["lost_motion_rad"]["median"] > 0 and small["lost_motion_rad"] is None
+
+
+@pytest.mark.parametrize("record", [0, 1])
+def test_the_parts_agree(result, record):
+    r = result["records"][record]
+    core = r["indicators"]
+    assert core["dissipation_ratio"]["median"] == pytest.approx(core["loop_area_J"]["median"] / core["absorbed_J"]["median"], rel=0.02)
+    assert r["by_amplitude"]["amplitude_Nm"][-1] == pytest.approx(r["amplitude_Nm"])
+    assert r["by_amplitude"]["loop_area_J"][-1]["median"] == pytest.approx(core["loop_area_J"]["median"], rel=0.03)
+    split = r["mechanism"]
+    assert split["S_g_over_S"]["median"] + split["S_f_over_S"]["median"] == pytest.approx(1, abs=0.1)
+    assert r["torque_energy"]["tau1_Nm"]["median"] <= r["torque_energy"]["tau2_Nm"]["median"]
+    assert r["loading_rate_Nm_per_s"] == pytest.approx(0.05, rel=0.02)
+    assert r["amplitude_Nm"] == pytest.approx((1.0, 0.5)[record] * RATED, rel=0.01)
+
+
+def test_two_loops_of_one_unit_agree_where_they_meet(result):
+    large, small = result["records"]
+    at_half = large["by_amplitude"]["loop_area_J"][4]
+    assert large["by_amplitude"]["amplitude_Nm"][4] == pytest.approx(small["amplitude_Nm"], rel=0.01)
+    assert at_half["median"] == pytest.approx(small["indicators"]["loop_area_J"]["median"], rel=0.1)

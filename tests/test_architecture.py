@@ -1,0 +1,143 @@
+"""The house's one direction, read from the imports themselves."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1] / "backdrive_bayes"
+PACKAGE = ROOT.name
+ORDER = ("errors", "records", "model", "inference", "indicators", "bench", "figures", "report", "commands", "__main__")
+"""A room imports only from itself and from rooms to its left."""
+
+FORBIDDEN = {
+    "records": {"model"},
+    "model": {"records"},
+    "bench": {"inference", "indicators"},
+    # A figure or a report is made from saved results and computes nothing.
+    "figures": {"records", "model", "inference", "indicators", "bench"},
+    "report": {"records", "model", "inference", "indicators", "bench"},
+}
+HEAVY = ("matplotlib", "corner", "typst", "dask", "pyarrow", "nptdms")
+
+
+def module_name(path):
+    parts = path.relative_to(ROOT.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(p): p for p in sorted(ROOT.rglob("*.py"))}
+
+
+def absolute(node, name):
+    """The module an ImportFrom names, relative imports resolved."""
+    if not node.level:
+        return node.module or ""
+    package = name if MODULES[name].name == "__init__.py" else name.rpartition(".")[0]
+    base = package.split(".")[: len(package.split(".")) - node.level + 1]
+    return ".".join([*base, *([node.module] if node.module else [])])
+
+
+def imports_of(name, source=None):
+    """Everything a module imports, at its top or inside functions, as dotted names."""
+    found = set()
+    for node in ast.walk(ast.parse(source or MODULES[name].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {a.name for a in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = absolute(node, name)
+            found |= {f"{base}.{a.name}" if f"{base}.{a.name}" in MODULES else base for a in node.names}
+    return found
+
+
+def own_imports(name, source=None):
+    return {i for i in imports_of(name, source) if i.split(".")[0] == PACKAGE and i != PACKAGE}
+
+
+def room(name):
+    return (name.split(".") + [""])[1]
+
+
+def wrong_way(name, source=None):
+    """Imports of a module that go against the order."""
+    here = ORDER.index(room(name))
+    return {
+        i for i in own_imports(name, source) if ORDER.index(room(i)) > here or room(i) in FORBIDDEN.get(room(name), ())
+    }
+
+
+def cycle(graph):
+    """One cycle of a mapping from names to sets of names, or None."""
+    done, trail = set(), []
+
+    def visit(node):
+        if node in trail:
+            return [*trail[trail.index(node) :], node]
+        if node in done:
+            return None
+        trail.append(node)
+        found = next((c for c in map(visit, sorted(graph.get(node, ()))) if c), None)
+        trail.pop()
+        done.add(node)
+        return found
+
+    return next((c for c in map(visit, sorted(graph)) if c), None)
+
+
+def test_every_room_has_its_place():
+    assert {room(m) for m in MODULES} - {""} == set(ORDER)
+    assert not own_imports(PACKAGE), "importing the package's root must import nothing"
+
+
+@pytest.mark.parametrize("name", [m for m in MODULES if room(m)])
+def test_module_imports_only_what_stands_before_it(name):
+    assert not wrong_way(name)
+
+
+def test_there_is_no_cycle():
+    assert cycle({m: own_imports(m) for m in MODULES}) is None
+
+
+def test_the_checks_see_what_they_forbid():
+    assert wrong_way("backdrive_bayes.records.noise", "from backdrive_bayes.model.path import TorquePath")
+    assert wrong_way("backdrive_bayes.model.play", "def f():\n    import backdrive_bayes.inference.fit")
+    assert wrong_way("backdrive_bayes.inference.problem", "from ..indicators.loop import Loops")
+    assert cycle({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == ["a", "b", "c", "a"]
+
+
+def importers_of(library):
+    return {m for m in MODULES if any(i.split(".")[0] == library for i in imports_of(m))}
+
+
+def test_emcee_is_known_to_one_module():
+    assert importers_of("emcee") == {"backdrive_bayes.inference.sampling"}
+
+
+@pytest.mark.parametrize("library", HEAVY)
+def test_optional_libraries_stay_out_of_the_core(library):
+    at_home = {"pyarrow": {"records"}, "nptdms": {"records"}}.get(library, {"figures", "report", "commands"})
+    assert {room(m) for m in importers_of(library)} <= at_home
+
+
+def loaded_after(statement):
+    code = f"import sys; {statement}; print(*sorted({{m.split('.')[0] for m in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT.parent)
+    return set(done.stdout.split())
+
+
+def test_the_core_loads_no_optional_library():
+    loaded = loaded_after("import backdrive_bayes.inference.fit, backdrive_bayes.indicators.summary")
+    assert not loaded & set(HEAVY)
+    assert "emcee" in loaded, "the subprocess must have loaded the core for this to mean something"
+    assert "pyarrow" in loaded_after("import pyarrow")
+
+
+def test_members_are_named_in_the_registry_only():
+    """A new effect is one file and one line: nothing else imports a member's module."""
+    plumbing = {"member", "parameter", "path", "play", "published", "reducer", "registry", ""}
+    members = {m for m in MODULES if room(m) == "model" and m.count(".") == 2 and m.split(".")[2] not in plumbing}
+    assert len(members) >= 3
+    for member in members:
+        assert {m for m in MODULES if member in own_imports(m)} <= {"backdrive_bayes.model.registry"}, member
