@@ -60,7 +60,7 @@ def _parser(argv: list[str]) -> argparse.ArgumentParser:
     asked = next((word for word in argv if not word.startswith("-")), None)
     for verb in [asked] if asked in VERBS else VERBS:
         module = importlib.import_module(f"backdrive_bayes.commands.{VERBS[verb]}")
-        own = verbs.add_parser(verb, help=module.HELP, description=module.HELP, allow_abbrev=False)
+        own = verbs.add_parser(verb, help=module.HELP.replace("%", "%%"), description=module.HELP.replace("%", "%%"), allow_abbrev=False)
         module.add_arguments(own)
         own.add_argument("-o", "--out", type=Path, metavar="OUT", help="folder to write into")
         own.add_argument(

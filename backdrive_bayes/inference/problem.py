@@ -20,7 +20,7 @@ from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
 
-WALKERS_AT_ONCE = 32
+WALKERS_AT_ONCE = 128
 """Chunk of walkers whose intermediate arrays stay in the cache; found by measurement (studies/speed.py)."""
 
 

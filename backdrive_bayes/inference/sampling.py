@@ -50,7 +50,7 @@ class Settings:
     ensembles: int = 4
     walkers: int = 64
     block: int = 60
-    warm_up_blocks: int = 10
+    warm_up_blocks: int = 6
     refits: int = 8
     kept_per_ensemble: int = 1000
     max_seconds: float = 120.0

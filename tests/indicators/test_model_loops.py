@@ -59,7 +59,9 @@ def test_module_loops_add_up_and_split_the_area():
     assert (np.abs(sum(p.rising for p in parts.values()) - whole.rising) < 1e-12 * size).all()
     area = {name: ind.loop_area_j(p) for name, p in parts.items()}
     np.testing.assert_allclose(area["elastic"], 0, atol=1e-16)
-    np.testing.assert_allclose(area["geometric"] + area["friction"], ind.loop_area_j(whole), rtol=1e-9, atol=1e-16)
+    np.testing.assert_allclose(
+        area["geometric"] + area["friction"], ind.loop_area_j(whole), rtol=1e-9, atol=1e-16
+    )
     assert (area["geometric"] >= -1e-16).all() and (area["friction"] >= -1e-12 * size[:, 0] * RATED).all()
     assert (area["geometric"] < 0.999 * ind.loop_area_j(whole)).any(), "friction must have its part"
 
@@ -71,14 +73,18 @@ def test_dissipation_ratio_of_settled_loops_is_a_ratio(share):
     assert ((ratio >= 0) & (ratio <= 1)).all()
 
 
-@pytest.mark.xfail(strict=True, reason="loops of small amplitude are not settled after one cycle of settled_path")
-@pytest.mark.parametrize("share", [0.1, 0.3])
+@pytest.mark.xfail(
+    strict=True, reason="loops of small amplitude are not settled after one cycle of settled_path"
+)
+@pytest.mark.parametrize("share", [0.05, 0.1])
 def test_dissipation_ratio_that_is_reported_is_a_ratio(share):
     ratio = ind.dissipation_ratio(model_loops(Prior(), Z, 0, torque_grid(share * RATED)))
     assert ((ratio >= 0) & (ratio <= 1)).all()
 
 
-@pytest.mark.parametrize("name", ["loop_area_j", "absorbed_j", "dissipation_ratio", "zero_torque_width_rad", "peak_angle_rad"])
+@pytest.mark.parametrize(
+    "name", ["loop_area_j", "absorbed_j", "dissipation_ratio", "zero_torque_width_rad", "peak_angle_rad"]
+)
 def test_grid_is_fine_enough(name, monkeypatch):
     problem, indicator = Prior(), getattr(ind, name)
     coarse = indicator(settled_loops(problem.model, problem.all, torque_grid(RATED)))

@@ -52,9 +52,13 @@ def test_k_is_reported_and_lost_motion_beyond_a_small_loop_is_null(result):
 def test_the_parts_agree(result, record):
     r = result["records"][record]
     core = r["indicators"]
-    assert core["dissipation_ratio"]["median"] == pytest.approx(core["loop_area_J"]["median"] / core["absorbed_J"]["median"], rel=0.02)
+    assert core["dissipation_ratio"]["median"] == pytest.approx(
+        core["loop_area_J"]["median"] / core["absorbed_J"]["median"], rel=0.02
+    )
     assert r["by_amplitude"]["amplitude_Nm"][-1] == pytest.approx(r["amplitude_Nm"])
-    assert r["by_amplitude"]["loop_area_J"][-1]["median"] == pytest.approx(core["loop_area_J"]["median"], rel=0.03)
+    assert r["by_amplitude"]["loop_area_J"][-1]["median"] == pytest.approx(
+        core["loop_area_J"]["median"], rel=0.03
+    )
     split = r["mechanism"]
     assert split["S_g_over_S"]["median"] + split["S_f_over_S"]["median"] == pytest.approx(1, abs=0.1)
     assert r["torque_energy"]["tau1_Nm"]["median"] <= r["torque_energy"]["tau2_Nm"]["median"]

@@ -40,10 +40,13 @@ def relative_gap(a, b):
 
 def test_block_covariance_is_the_average_of_the_kernel():
     found = block_covariance(uneven_blocks(CUTS), known_estimate(NOISE))
-    # A single sample is treated as an average over its own step: 1 - step / (3 t_c), about one per cent at 1 kHz.
+    # A single sample passes for an average over its own step: 1 - step / (3 t_c), one per cent at 1 kHz.
     assert relative_gap(found, averaged(CUTS, NOISE)) < 0.012
     long = CUTS[CUTS >= 30] - 30
-    assert relative_gap(block_covariance(uneven_blocks(long), known_estimate(NOISE)), averaged(long, NOISE)) < 0.012
+    assert (
+        relative_gap(block_covariance(uneven_blocks(long), known_estimate(NOISE)), averaged(long, NOISE))
+        < 0.012
+    )
 
 
 def test_independent_blocks_are_not_the_average_of_the_kernel():
@@ -51,11 +54,16 @@ def test_independent_blocks_are_not_the_average_of_the_kernel():
     assert relative_gap(found, averaged(CUTS, NOISE)) > 0.3
 
 
-@pytest.mark.xfail(strict=True, reason="a block of one sample is averaged over its step, which matters when the step nears t_c")
+@pytest.mark.xfail(
+    strict=True,
+    reason="a block of one sample is averaged over its step, which matters when the step nears t_c",
+)
 def test_coarse_sampling_has_the_covariance_of_its_samples():
     slow = BenchNoise(white_rad=0.0, correlated_rad=7e-5, correlation_time_s=1.5e-3)
     cuts = np.arange(20)
-    assert relative_gap(block_covariance(uneven_blocks(cuts), known_estimate(slow)), averaged(cuts, slow)) < 0.05
+    assert (
+        relative_gap(block_covariance(uneven_blocks(cuts), known_estimate(slow)), averaged(cuts, slow)) < 0.05
+    )
 
 
 def test_monte_carlo_block_means_have_the_covariance():
@@ -65,8 +73,13 @@ def test_monte_carlo_block_means_have_the_covariance():
     found = white @ white.T / runs
     error = np.sqrt((1 + np.eye(8)) / runs)
     assert (np.abs(found - np.eye(8)) < 4.5 * error).all()
-    naive = np.diag(1 / np.sqrt(np.diag(block_covariance(even_blocks(480, size), known_estimate(NOISE))))) @ means.T
-    assert (np.abs(naive @ naive.T / runs - np.eye(8)) > 4.5 * error).any(), "independent blocks must fail this check"
+    naive = (
+        np.diag(1 / np.sqrt(np.diag(block_covariance(even_blocks(480, size), known_estimate(NOISE)))))
+        @ means.T
+    )
+    assert (np.abs(naive @ naive.T / runs - np.eye(8)) > 4.5 * error).any(), (
+        "independent blocks must fail this check"
+    )
 
 
 @pytest.mark.parametrize("ratio", [1e-4, 5e-3, 0.0099, 0.0101, 0.5, 20.0, 1e4])

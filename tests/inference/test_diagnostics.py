@@ -50,7 +50,9 @@ def test_independent_draws_pass(seed):
     found = diagnose_draws(("a", "b", "c"), independent(seed), STEP, 2.0)
     assert found.outcome is Outcome.CONVERGED
     assert (found.bulk_ess > 2500).all() and (found.rhat < 1.005).all()
-    assert found.to_json()["converged"] and found.to_json()["advice"] == "" and found.to_json()["seconds"] == 2.0
+    assert (
+        found.to_json()["converged"] and found.to_json()["advice"] == "" and found.to_json()["seconds"] == 2.0
+    )
 
 
 @pytest.mark.parametrize("trouble", [shifted_ensemble, drifting, other_spread, stuck_walkers, slow_walkers])
@@ -59,7 +61,9 @@ def test_trouble_is_flagged_and_named(trouble):
     assert found.outcome is Outcome.NOT_CONVERGED
     passing = (found.rhat < 1.01) & (found.bulk_ess >= 1000) & (found.tail_ess >= 1000)
     assert passing.tolist() == [True, False, True]
-    assert found.to_json()["advice"] == Outcome.NOT_CONVERGED.value and "--budget" in found.to_json()["advice"]
+    assert (
+        found.to_json()["advice"] == Outcome.NOT_CONVERGED.value and "--budget" in found.to_json()["advice"]
+    )
 
 
 def test_worst_names_the_smallest_ess():
@@ -74,7 +78,9 @@ def test_a_constant_quantity_is_no_trouble():
     assert found.outcome is Outcome.CONVERGED and np.isfinite(found.to_json()["max_rhat"])
 
 
-@pytest.mark.xfail(strict=True, reason="a NaN R-hat counts as a constant quantity, also when a few draws are NaN")
+@pytest.mark.xfail(
+    strict=True, reason="a NaN R-hat counts as a constant quantity, also when a few draws are NaN"
+)
 def test_a_few_undefined_draws_do_not_pass_as_constant():
     draws = independent()
     draws[0, :3, 1] = np.nan

@@ -18,8 +18,10 @@ RATE, K, MISFIT_RAD = 0.05, 0.03, 4e-4
 
 
 def misfit(torque, direction):
-    """An even wave, which no odd module can follow, and a wave of opposite sign on the two branches, in rad."""
-    return MISFIT_RAD * (np.cos(2 * np.pi * torque / RATED) + 0.5 * direction * np.sin(np.pi * torque / RATED))
+    """An even wave, which no odd module can follow, and one of opposite sign on the two branches, in rad."""
+    return MISFIT_RAD * (
+        np.cos(2 * np.pi * torque / RATED) + 0.5 * direction * np.sin(np.pi * torque / RATED)
+    )
 
 
 def spoilt_unit(seed):
@@ -101,7 +103,9 @@ def test_basis_is_orthogonal_to_the_parameters(spoilt):
     jacobian = data.whitener @ angle_jacobian(problem, d.optimum.z, 0, data.path)
     np.testing.assert_allclose(jacobian, -d.optimum.jacobian, atol=1e-4 * np.abs(jacobian).max())
     assert alignment(jacobian, data.whitener @ d.basis_on(problem, 0, data.path, first_leg=True)) < 0.02
-    assert alignment(jacobian, data.whitener @ d.raw_basis(0, data.path)) > 0.3, "the raw basis must fail this check"
+    assert alignment(jacobian, data.whitener @ d.raw_basis(0, data.path)) > 0.3, (
+        "the raw basis must fail this check"
+    )
 
 
 def test_absent_discrepancy_draws_nothing(spoilt):

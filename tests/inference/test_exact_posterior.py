@@ -38,7 +38,7 @@ def exact_log_likelihood(problem, unit, z, noise):
 
 @pytest.fixture(scope="module")
 def exact():
-    """Points drawn about the mode, their coordinates in posterior standard deviations, and the exact likelihood there."""
+    """Points about the mode, their coordinates in standard deviations, and the exact likelihood there."""
     unit = unit_of(5, rate=RATE, noise=NOISE)
     assert unit.records[0].time_s.size == 6001
     problem = problem_of(unit, NOISE)
@@ -49,7 +49,7 @@ def exact():
 
 
 def disagreement(exact, problem):
-    """Largest shift of the mean and change of the standard deviation along a principal axis, in standard deviations."""
+    """Largest shift of the mean and change of the sd along a principal axis, in standard deviations."""
     _, z, unit_z, raw = exact
     shift, precision = quadratic_difference(unit_z, problem.log_likelihood(z) - raw)
     # The axes are those of the reduced posterior, whose precision is the unit matrix there.
@@ -58,7 +58,7 @@ def disagreement(exact, problem):
 
 
 def curvature_bias(blocks_per_segment):
-    """Largest shift of a parameter, in its standard deviations, that block averages of a noise-free record bring about."""
+    """Largest shift of a parameter, in its sd, that block averages of a noise-free record bring about."""
     quiet = BenchNoise(1e-15, 1e-15, 0.03, 1e-12)
     problem = problem_of(unit_of(5, rate=RATE, noise=quiet), NOISE, blocks_per_segment)
     truth = np.full(problem.dimension, 0.3)
@@ -97,7 +97,9 @@ def test_independent_blocks_are_noticed(exact):
     assert disagreement(exact, naive)[1] > 0.08
 
 
-@pytest.mark.xfail(strict=True, reason="the model is taken at a block's mean torque, not averaged over the block")
+@pytest.mark.xfail(
+    strict=True, reason="the model is taken at a block's mean torque, not averaged over the block"
+)
 @pytest.mark.parametrize("blocks_per_segment", [120, 400])
 def test_block_averages_bring_no_bias(blocks_per_segment):
     assert curvature_bias(blocks_per_segment) < 0.1

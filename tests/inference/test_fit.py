@@ -60,7 +60,10 @@ def test_enough_time_converges_in_every_parameter_and_indicator(patient):
     assert patient.converged, patient.convergence.to_json()
     named = set(patient.convergence.names)
     assert set(patient.problem.labels) < named and any("loop_area_J" in n for n in named)
-    assert patient.convergence.to_json()["min_bulk_ess"] >= 1000 and patient.convergence.to_json()["max_rhat"] < 1.01
+    assert (
+        patient.convergence.to_json()["min_bulk_ess"] >= 1000
+        and patient.convergence.to_json()["max_rhat"] < 1.01
+    )
 
 
 def test_posterior_of_the_parameters_holds_the_truth(patient):

@@ -1,4 +1,4 @@
-"""Both sides of the noise model's claim: intervals from white noise on raw samples, from independent blocks, from exact blocks.
+"""Both sides of the noise model's claim: white noise on raw samples, independent blocks, exact blocks.
 
 The problem is the real model made linear in three of its parameters, under correlated noise, many times over.
 """
@@ -20,12 +20,18 @@ NORMAL_90 = 1.6448536269514722
 
 
 def directions():
-    """Derivatives of the angle by three parameters, and the offset's, along a rising branch, shape (samples, 4)."""
-    model, torque = reducer(), np.r_[0.0, np.linspace(RATED, -RATED, 200), np.linspace(-RATED, RATED, SAMPLES)]
+    """Derivatives of the angle by the offset and three parameters on a rising branch, (samples, 4)."""
+    model, torque = (
+        reducer(),
+        np.r_[0.0, np.linspace(RATED, -RATED, 200), np.linspace(-RATED, RATED, SAMPLES)],
+    )
     path, centre = TorquePath.from_samples(torque), typical_values(reducer())
     columns = [np.ones(SAMPLES)]
     for name in PARAMETERS:
-        pair = [model.angle({k: np.array([v * (1 + h * (k == name))]) for k, v in centre.items()}, path) for h in (0.01, -0.01)]
+        pair = [
+            model.angle({k: np.array([v * (1 + h * (k == name))]) for k, v in centre.items()}, path)
+            for h in (0.01, -0.01)
+        ]
         columns.append((pair[0] - pair[1])[-SAMPLES:] / 0.02)
     return np.array(columns).T
 
@@ -75,7 +81,10 @@ def test_independent_blocks_cover_too_little():
     assert (coverage("independent blocks") < LOW).all()
 
 
-@pytest.mark.parametrize(("way", "low", "high"), [("white raw", 0.1, 0.3), ("independent blocks", 0.6, 0.9), ("exact blocks", 0.92, 1.08)])
+@pytest.mark.parametrize(
+    ("way", "low", "high"),
+    [("white raw", 0.1, 0.3), ("independent blocks", 0.6, 0.9), ("exact blocks", 0.92, 1.08)],
+)
 def test_claimed_against_true_standard_deviation(way, low, high):
     error, sd = estimates(way)
     claimed = sd / error.std(axis=0)

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal
-from support.bench import KNOWN_NOISE, kalman_whiten, known_estimate, problem_of, raw_covariance, unit_of, without_offset
+from support.bench import (
+    KNOWN_NOISE,
+    kalman_whiten,
+    known_estimate,
+    problem_of,
+    raw_covariance,
+    unit_of,
+    without_offset,
+)
 from support.known import RATED
 
 from backdrive_bayes.inference.covariance import block_covariance
@@ -13,7 +21,9 @@ from backdrive_bayes.inference.problem import Problem
 
 @pytest.fixture(scope="module")
 def problem():
-    return problem_of(unit_of(0, rate=0.2, amplitudes=(RATED, 0.5 * RATED)), KNOWN_NOISE, blocks_per_segment=30)
+    return problem_of(
+        unit_of(0, rate=0.2, amplitudes=(RATED, 0.5 * RATED)), KNOWN_NOISE, blocks_per_segment=30
+    )
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +46,9 @@ def test_offset_marginalisation_is_a_huge_constant_covariance(problem, points):
         covariance = block_covariance(data.blocks, known_estimate(KNOWN_NOISE))
         residual = raw_residuals(problem, points, r)
         n = residual.shape[1]
-        total = total + multivariate_normal(np.zeros(n), covariance + 1e4 * KNOWN_NOISE.correlated_rad**2).logpdf(residual)
+        total = total + multivariate_normal(
+            np.zeros(n), covariance + 1e4 * KNOWN_NOISE.correlated_rad**2
+        ).logpdf(residual)
         kept = kept + multivariate_normal(np.zeros(n), covariance).logpdf(residual)
     reduced = differences(problem.log_likelihood(points))
     np.testing.assert_allclose(reduced, differences(total), rtol=2e-3, atol=1e-2)
@@ -54,7 +66,9 @@ def test_offset_marginalisation_is_an_integral(problem, points):
     logs = []
     for row, centre in zip(residual, best, strict=True):
         peak = law.logpdf(row - centre)
-        area = quad(lambda g, row=row, peak=peak: np.exp(law.logpdf(row - g) - peak), centre - 9 * sd, centre + 9 * sd)[0]
+        area = quad(
+            lambda g, row=row, peak=peak: np.exp(law.logpdf(row - g) - peak), centre - 9 * sd, centre + 9 * sd
+        )[0]
         logs.append(peak + np.log(area))
     assert logs[1] - logs[0] == pytest.approx(np.diff(alone.log_likelihood(z))[0], abs=2e-3)
 
@@ -66,7 +80,7 @@ def test_common_noise_factor_is_marginalised(problem, points):
     n, nu = uncertain.dof, 12.0
     logs = []
     for value in chi2:
-        # Variance factor f under a scaled inverse chi-square prior of nu degrees of freedom, times the Gaussian in f.
+        # Variance factor f: scaled inverse chi-square prior of nu degrees of freedom times the Gaussian.
         def density(log_f, value=value):
             return -0.5 * (n + nu) * log_f - 0.5 * (value + nu) * np.exp(-log_f)
 

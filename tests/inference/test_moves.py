@@ -33,7 +33,11 @@ class Shrinking(DEMove):
 
 class _Names:
     def __init__(self, random):
-        self.choice, self.chisquare, self.standard_normal = random.choice, random.chisquare, random.standard_normal
+        self.choice, self.chisquare, self.standard_normal = (
+            random.choice,
+            random.chisquare,
+            random.standard_normal,
+        )
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +77,11 @@ def test_move_keeps_the_target(moves, steps, truth):
     assert agrees(draws, *truth), disagreement(draws, *truth)
 
 
-WRONG = {"no density correction": Uncorrected(RIDGE), "shrinking step": Shrinking(), "stock snooker": DESnookerMove()}
+WRONG = {
+    "no density correction": Uncorrected(RIDGE),
+    "shrinking step": Shrinking(),
+    "stock snooker": DESnookerMove(),
+}
 
 
 @pytest.mark.parametrize("move", WRONG.values(), ids=WRONG)
@@ -83,7 +91,9 @@ def test_wrong_move_is_found_out(move, truth):
 
 def run(seed, walkers=WALKERS):
     rng = np.random.default_rng(seed)
-    settings = Settings(ensembles=ENSEMBLES, walkers=walkers, block=150, kept_per_ensemble=20_000, good_share=0.9)
+    settings = Settings(
+        ensembles=ENSEMBLES, walkers=walkers, block=150, kept_per_ensemble=20_000, good_share=0.9
+    )
     proposal, best = warm_up(Banana.log_posterior, Banana.mean, np.diag(Banana.sd**2), rng, settings)
     assert Banana.log_posterior(best)[0] > Banana.log_posterior(Banana.mean)[0] - 5
     return run_ensembles(
@@ -120,7 +130,9 @@ def test_a_seed_fixes_every_draw_and_kept_draws_are_bounded():
     settings = Settings(ensembles=2, walkers=16, block=20, kept_per_ensemble=100)
 
     def once(seed):
-        return run_ensembles(Banana.log_posterior, RIDGE, np.random.default_rng(seed), settings, lambda d: False, lambda: True)
+        return run_ensembles(
+            Banana.log_posterior, RIDGE, np.random.default_rng(seed), settings, lambda d: False, lambda: True
+        )
 
     a, b, c = once(5), once(5), once(6)
     assert np.array_equal(a.z, b.z) and not np.array_equal(a.z, c.z)

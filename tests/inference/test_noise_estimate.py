@@ -13,7 +13,9 @@ SEEDS = range(5)
 
 
 def channel(record):
-    return ChannelRecord(record.time_s, record.torque_nm, record.angle_rad, find_segments(record.time_s, record.torque_nm))
+    return ChannelRecord(
+        record.time_s, record.torque_nm, record.angle_rad, find_segments(record.time_s, record.torque_nm)
+    )
 
 
 def estimated(seed, rate, noise=KNOWN_NOISE):
@@ -40,7 +42,9 @@ def test_known_noise_is_recovered(rate, factors):
 
 
 def test_wrong_noise_would_be_noticed():
-    doubled = BenchNoise(2 * KNOWN_NOISE.white_rad, 2 * KNOWN_NOISE.correlated_rad, 0.06, 2 * KNOWN_NOISE.torque_nm)
+    doubled = BenchNoise(
+        2 * KNOWN_NOISE.white_rad, 2 * KNOWN_NOISE.correlated_rad, 0.06, 2 * KNOWN_NOISE.torque_nm
+    )
     assert not within(ratios(0.05, used=doubled), SHORT)
 
 
@@ -48,15 +52,18 @@ def test_errors_are_within_their_standard_errors():
     pulls = []
     for seed in range(12):
         found = estimated(seed, 0.05)
-        pulls.append([(getattr(found, f) - getattr(KNOWN_NOISE, f)) / getattr(found, f"{f}_sd") for f in FIELDS])
+        pulls.append(
+            [(getattr(found, f) - getattr(KNOWN_NOISE, f)) / getattr(found, f"{f}_sd") for f in FIELDS]
+        )
     spread = np.sqrt(np.mean(np.square(pulls), axis=0))
     assert (spread < 2.0).all() and (spread > 0.2).all(), dict(zip(FIELDS, spread, strict=True))
 
 
 def test_units_of_angle_and_torque_only_scale_the_result():
     c = channel(unit_of(0, rate=0.05).records[0])
-    small, big = estimate_noise(c.time_s, c.torque_nm, c.angle_rad, c.segments), estimate_noise(
-        c.time_s, 30 * c.torque_nm, 1000 * c.angle_rad, c.segments
+    small, big = (
+        estimate_noise(c.time_s, c.torque_nm, c.angle_rad, c.segments),
+        estimate_noise(c.time_s, 30 * c.torque_nm, 1000 * c.angle_rad, c.segments),
     )
     assert big.white_rad == pytest.approx(1000 * small.white_rad, rel=1e-3)
     assert big.correlated_rad == pytest.approx(1000 * small.correlated_rad, rel=1e-3)
@@ -65,7 +72,10 @@ def test_units_of_angle_and_torque_only_scale_the_result():
 
 
 def test_records_of_one_bench_share_the_angle_noise():
-    records = [channel(unit_of(s, rate=0.05, noise=n).records[0]) for s, n in ((0, KNOWN_NOISE), (1, BenchNoise(torque_nm=5e-4)))]
+    records = [
+        channel(unit_of(s, rate=0.05, noise=n).records[0])
+        for s, n in ((0, KNOWN_NOISE), (1, BenchNoise(torque_nm=5e-4)))
+    ]
     first, second = estimate_common_noise(records)
     assert (first.white_rad, first.correlated_rad) == (second.white_rad, second.correlated_rad)
     assert second.torque_nm / first.torque_nm == pytest.approx(5, rel=0.05)

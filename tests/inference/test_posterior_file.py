@@ -13,7 +13,7 @@ BRIEF = Settings(max_seconds=0.0, block=30, kept_per_ensemble=400)
 
 
 def offset_gap(baseline):
-    """Generalised-least-squares offset of data less mean replicate, in standard deviations of the replicates' own offsets."""
+    """Offset of data less mean replicate, in standard deviations of the replicates' own offsets."""
     posterior = fit(unit_of(4, rate=0.05), baseline=baseline, seed=1, settings=BRIEF, scale=SCALE)
     groups, weight = posterior_groups(posterior), posterior.problem.records[0].offset_weight
     replicate = groups["posterior_predictive"]["angle_rad"].values.astype(float)
@@ -26,6 +26,8 @@ def test_replicates_sit_on_the_data_where_the_model_is_true():
     assert offset_gap(("geometric", "elastic", "friction")) < 3
 
 
-@pytest.mark.xfail(strict=True, reason="the offset is drawn as if there were no discrepancy, and the discrepancy added to it")
+@pytest.mark.xfail(
+    strict=True, reason="the offset is drawn as if there were no discrepancy, and the discrepancy added to it"
+)
 def test_replicates_sit_on_the_data_where_there_is_model_error():
     assert offset_gap(("elastic",)) < 3

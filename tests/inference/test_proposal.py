@@ -27,7 +27,9 @@ def one_component():
 
 def two_bumps(rng, n=4000):
     left = rng.random(n) < 0.3
-    return np.where(left[:, None], -4.0, 3.0) + rng.standard_normal((n, 2)) * np.where(left[:, None], 0.5, 1.5)
+    return np.where(left[:, None], -4.0, 3.0) + rng.standard_normal((n, 2)) * np.where(
+        left[:, None], 0.5, 1.5
+    )
 
 
 def test_one_component_is_the_multivariate_t():
@@ -47,7 +49,9 @@ def test_a_single_has_a_broad_copy():
 def test_mixture_density_integrates_to_one():
     rng = np.random.default_rng(1)
     line = fit_mixture(two_bumps(rng)[:, :1], np.full(4000, 1 / 4000), rng, 3)
-    total = quad(lambda x: np.exp(line.log_density(np.array([[x]]))[0]), -80, 80, points=[-4, 0, 3], limit=200)[0]
+    total = quad(
+        lambda x: np.exp(line.log_density(np.array([[x]]))[0]), -80, 80, points=[-4, 0, 3], limit=200
+    )[0]
     assert total == pytest.approx(1, abs=1e-4)
     plane = fit_mixture(two_bumps(rng), np.full(4000, 1 / 4000), rng, 3)
     # By importance sampling from a wider density: the mean weight is the integral.

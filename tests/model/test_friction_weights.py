@@ -46,7 +46,12 @@ def test_each_weight_is_the_integral_of_its_hat():
     weights = hat_weights(nodes, np.array([mean]), np.array([spread]))
     for k in range(1, nodes.size - 1):
         hat = np.eye(nodes.size)[k]
-        expected = quad(lambda x, h=hat: np.interp(x, nodes, h) * law.pdf(x), nodes[k - 1], nodes[k + 1], points=[nodes[k]])[0]
+        expected = quad(
+            lambda x, h=hat: np.interp(x, nodes, h) * law.pdf(x),
+            nodes[k - 1],
+            nodes[k + 1],
+            points=[nodes[k]],
+        )[0]
         assert weights[k] == pytest.approx(expected, abs=1e-10)
 
 

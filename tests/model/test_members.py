@@ -2,7 +2,16 @@
 
 import numpy as np
 import pytest
-from support.known import RATED, SCALE, as_arrays, cycles, prior_values, random_torques, reducer, typical_values
+from support.known import (
+    RATED,
+    SCALE,
+    as_arrays,
+    cycles,
+    prior_values,
+    random_torques,
+    reducer,
+    typical_values,
+)
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.model.member import Drive, Stage
@@ -25,7 +34,7 @@ def zigzag(seed=0):
 
 
 def null_gap(member, path, nulls):
-    """How far from absent the member is with ``nulls`` put in for its parameters, relative to what it normally does."""
+    """How far from absent the member is with ``nulls`` put in, relative to what it normally does."""
     values = as_arrays(typical_values(reducer()))
     drive = Drive(path, RATED, path.torque_nm)
     absent = path.torque_nm if member.stage is Stage.TRANSMISSION else 0.0
@@ -55,7 +64,9 @@ def test_parameter_names_are_unique_over_the_registry():
 NULL_IS_NAN = pytest.mark.xfail(strict=True, reason="hat_weights gives NaN at a mean of exactly zero")
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=NULL_IS_NAN) if n == "friction" else n for n in NAMES])
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=NULL_IS_NAN) if n == "friction" else n for n in NAMES]
+)
 def test_member_is_absent_at_its_null_value(name):
     member = MEMBERS[name]
     assert null_gap(member, zigzag(), nulls_of(member)) < 1e-12
@@ -113,15 +124,21 @@ def test_negated_torque_and_past_give_the_negated_angle(name):
     np.testing.assert_allclose(back, -there, rtol=0, atol=1e-12 * np.abs(there).max())
     if HISTORY & set(values):
         unflipped = model.angle(values, TorquePath.from_samples(-torque))
-        assert np.abs(unflipped + there).max() > 1e-3 * np.abs(there).max(), "the past must matter for this test to see it"
+        assert np.abs(unflipped + there).max() > 1e-3 * np.abs(there).max(), (
+            "the past must matter for this test to see it"
+        )
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scaling_torque_and_angle_scales_the_result(name):
     model, torque = own_model(name), random_torques(np.random.default_rng(6))
     big = ReducerModel(model.members, Scale(37.0 * SCALE.torque_nm, 5.0 * SCALE.angle_rad))
-    small_angle = model.angle(prior_values(model, np.random.default_rng(7), 20), TorquePath.from_samples(torque))
-    big_angle = big.angle(prior_values(big, np.random.default_rng(7), 20), TorquePath.from_samples(37.0 * torque))
+    small_angle = model.angle(
+        prior_values(model, np.random.default_rng(7), 20), TorquePath.from_samples(torque)
+    )
+    big_angle = big.angle(
+        prior_values(big, np.random.default_rng(7), 20), TorquePath.from_samples(37.0 * torque)
+    )
     np.testing.assert_allclose(big_angle, 5.0 * small_angle, rtol=0, atol=1e-11 * np.abs(big_angle).max())
 
 

@@ -27,7 +27,9 @@ def test_samples_give_back_the_turning_points(raw):
         return
     path = TorquePath.from_turning_points(levels, points_per_leg=7)
     turns = true_turns(levels)
-    assert [path.start_torque_nm, *[leg.end_torque_nm for leg in path.legs]] == pytest.approx(turns, abs=1e-12)
+    assert [path.start_torque_nm, *[leg.end_torque_nm for leg in path.legs]] == pytest.approx(
+        turns, abs=1e-12
+    )
     assert [leg.direction for leg in path.legs] == list(np.sign(np.diff(turns)))
     assert path.legs[0].start == 0 and path.legs[-1].stop == path.torque_nm.size
     for a, b in zip(path.legs[:-1], path.legs[1:], strict=True):

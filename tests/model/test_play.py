@@ -55,7 +55,9 @@ def test_a_forgetful_operator_is_found_out():
     assert np.abs(forgetful(torque, lower, state) - brute_force(torque, lower, state)).max() > 1e-3
 
 
-@pytest.mark.parametrize(("past", "expected"), [(-np.inf, [-0.05, -0.04, -0.03]), (np.inf, [0.05, 0.05, 0.05])])
+@pytest.mark.parametrize(
+    ("past", "expected"), [(-np.inf, [-0.05, -0.04, -0.03]), (np.inf, [0.05, 0.05, 0.05])]
+)
 def test_any_past_is_moved_between_the_boundaries(past, expected):
     path = TorquePath.from_samples(np.array([0.0, 0.01, 0.02]))
     found = play(path, lambda t: t - np.full((1, 1), 0.05), np.full((1, 1), past))
@@ -67,4 +69,6 @@ def test_rate_does_not_matter():
     torque, lower = random_torques(rng), boundary(rng)
     fine = np.interp(np.arange(0, torque.size - 1, 0.25), np.arange(torque.size), torque)
     coarse = play(TorquePath.from_samples(torque), lower, np.zeros((3, 1)))
-    np.testing.assert_allclose(play(TorquePath.from_samples(fine), lower, np.zeros((3, 1)))[:, ::4], coarse[:, :-1], atol=1e-14)
+    np.testing.assert_allclose(
+        play(TorquePath.from_samples(fine), lower, np.zeros((3, 1)))[:, ::4], coarse[:, :-1], atol=1e-14
+    )

@@ -27,7 +27,9 @@ def test_round_trip(name):
     z = np.linspace(-5, 5, 41)
     np.testing.assert_allclose(PRIORS[name].to_normal(PRIORS[name].from_normal(z)), z, atol=1e-6)
     value = stated(PRIORS[name]).ppf(np.linspace(0.01, 0.99, 25))
-    np.testing.assert_allclose(PRIORS[name].from_normal(PRIORS[name].to_normal(value)), value, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(
+        PRIORS[name].from_normal(PRIORS[name].to_normal(value)), value, rtol=1e-10, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", PRIORS)

@@ -1,10 +1,11 @@
-"""Eq. (20), reconstructed: its closed forms, and the conditions under which the model with memory reduces to it.
+"""Eq. (20), reconstructed: its closed forms, and when the model with memory reduces to it.
 
-The branches of a settled loop ±T are those of eq. (20) exactly where every play operator slides: at torques further than
-2·max(drag torque, largest friction threshold) from the reversal, for a linear elastic unit (hardening_ratio = 1), without
-release (release_share = 0) and with constant thresholds (friction_ratio → 0). Then a1 = compliance, A = clearance / 2,
-B = 1 / engagement_torque, D = drag_torque / engagement_torque and d0 = compliance · (1 − free_share) · friction_torque,
-the last because the weights preserve the mean threshold.
+The branches of a settled loop ±T are those of eq. (20) exactly where every play operator slides: at torques
+further than 2·max(drag torque, largest friction threshold) from the reversal, for a linear elastic unit
+(hardening_ratio = 1), without release (release_share = 0) and with constant thresholds (friction_ratio → 0).
+Then a1 = compliance, A = clearance / 2, B = 1 / engagement_torque, D = drag_torque / engagement_torque and
+d0 = compliance · (1 − free_share) · friction_torque because
+the weights preserve the mean threshold.
 """
 
 import numpy as np
@@ -19,7 +20,8 @@ from backdrive_bayes.model.published import PublishedLoop
 
 LOOP = PublishedLoop(0.004, 0.21, 3.0, 40.0, 0.006, 130.0, 0.9, 5e-4)
 SATURATING = {
-    "clearance": 0.012, "drag_torque": 0.006, "engagement_torque": 0.004, "release_share": 0.0, "release_torque": 0.003,
+    "clearance": 0.012, "drag_torque": 0.006, "engagement_torque": 0.004, "release_share": 0.0,
+    "release_torque": 0.003,
     "initial_gap_position": 0.4, "compliance": 0.15, "hardening_ratio": 1.0, "hardening_torque": 0.04,
     "friction_torque": 0.003, "friction_ratio": 1e-300, "friction_spread": 0.05, "free_share": 0.25,
     "initial_friction_state": -0.5,
@@ -35,7 +37,9 @@ def predicted(v):
     v = {k: float(x[0, 0]) for k, x in v.items()}
     s = v["engagement_torque"]
     d0 = v["compliance"] * (1 - v["free_share"]) * v["friction_torque"]
-    return PublishedLoop(0.0, v["compliance"], 0.0, 0.0, 0.5 * v["clearance"], 1 / s, v["drag_torque"] / s, d0)
+    return PublishedLoop(
+        0.0, v["compliance"], 0.0, 0.0, 0.5 * v["clearance"], 1 / s, v["drag_torque"] / s, d0
+    )
 
 
 def reach(v):
@@ -55,7 +59,9 @@ def misfit(v, margin=1.0):
     return max(np.abs(up[slides]).max(), np.abs(down[slides[::-1]]).max()) / np.ptp(loops.rising)
 
 
-@pytest.mark.parametrize("changes", [{}, {"friction_spread": 0.2}, {"friction_torque": 0.011}, {"free_share": 0.0}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"friction_spread": 0.2}, {"friction_torque": 0.011}, {"free_share": 0.0}]
+)
 def test_saturated_branches_are_eq_20(changes):
     assert misfit(values_with(**changes)) < 1e-9
 
@@ -97,7 +103,13 @@ def test_area_is_the_closed_form_less_the_corners():
 
 @pytest.mark.parametrize("amplitude", [0.004, 0.03, 0.1])
 def test_area_against_quadrature(amplitude):
-    expected = quad(lambda t: LOOP.angle_rad(t, -1) - LOOP.angle_rad(t, 1), -amplitude, amplitude, points=[0.0], epsabs=1e-14)[0]
+    expected = quad(
+        lambda t: LOOP.angle_rad(t, -1) - LOOP.angle_rad(t, 1),
+        -amplitude,
+        amplitude,
+        points=[0.0],
+        epsabs=1e-14,
+    )[0]
     assert LOOP.area_j(amplitude) == pytest.approx(expected, rel=1e-9)
 
 

@@ -38,7 +38,9 @@ def test_a_creeping_angle_would_not_close():
     assert tip_gap(angle + creep, 40).min() > 1e-9
 
 
-@pytest.mark.xfail(strict=True, reason="settled_path runs one loop, but a past state can need one loop to be forgotten")
+@pytest.mark.xfail(
+    strict=True, reason="settled_path runs one loop, but a past state can need one loop to be forgotten"
+)
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
 def test_the_path_that_indicators_use_is_settled(share):
     grid = torque_grid(share * RATED)
@@ -67,7 +69,9 @@ def test_settled_loop_never_makes_energy(seed, share):
 def test_minor_loop_closes_and_is_forgotten(seed, at, depth):
     turn = at * RATED
     back = turn - depth * (turn + RATED)
-    with_minor = TorquePath.from_turning_points([0, RATED, -RATED, RATED, -RATED, turn, back, turn, RATED], 30)
+    with_minor = TorquePath.from_turning_points(
+        [0, RATED, -RATED, RATED, -RATED, turn, back, turn, RATED], 30
+    )
     without = TorquePath.from_turning_points([0, RATED, -RATED, RATED, -RATED, turn, RATED], 30)
     values = prior_values(MODEL, np.random.default_rng(seed), 30)
     a, b = MODEL.angle(values, with_minor), MODEL.angle(values, without)
@@ -80,7 +84,9 @@ def test_minor_loop_closes_and_is_forgotten(seed, at, depth):
 
 
 def test_a_minor_loop_that_is_not_closed_leaves_its_mark():
-    open_loop = TorquePath.from_turning_points([0, RATED, -RATED, RATED, -RATED, 0.5 * RATED, 0.0, 0.02 * RATED], 30)
+    open_loop = TorquePath.from_turning_points(
+        [0, RATED, -RATED, RATED, -RATED, 0.5 * RATED, 0.0, 0.02 * RATED], 30
+    )
     straight = TorquePath.from_turning_points([0, RATED, -RATED, RATED, -RATED, 0.02 * RATED], 30)
     values = prior_values(MODEL, np.random.default_rng(1), 30)
     gap = MODEL.angle(values, open_loop)[:, -1] - MODEL.angle(values, straight)[:, -1]

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
-from support.known import RATED, SCALE, reducer, typical_values
 
 from backdrive_bayes.bench.known_truth import BenchNoise, simulate_unit
 from backdrive_bayes.inference.problem import Problem, RecordData
@@ -12,6 +11,7 @@ from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import Blocks, reduce_record
+from support.known import RATED, reducer, typical_values
 
 KNOWN_NOISE = BenchNoise()
 
@@ -19,7 +19,15 @@ KNOWN_NOISE = BenchNoise()
 def known_estimate(noise: BenchNoise, dof=1e9):
     """The truth about the noise in the shape of an estimate."""
     return NoiseEstimate(
-        noise.white_rad, noise.correlated_rad, noise.correlation_time_s, noise.torque_nm, 0.0, 0.0, 0.0, 0.0, dof
+        noise.white_rad,
+        noise.correlated_rad,
+        noise.correlation_time_s,
+        noise.torque_nm,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        dof,
     )
 
 
@@ -36,7 +44,9 @@ def problem_of(unit, noise: BenchNoise, blocks_per_segment=120, dof=1e9) -> Prob
     estimate, records = known_estimate(noise, dof), []
     for record in unit.records:
         segments = find_segments(record.time_s, record.torque_nm)
-        records.append(RecordData.prepare(reduce_record(record, segments, estimate, blocks_per_segment), estimate))
+        records.append(
+            RecordData.prepare(reduce_record(record, segments, estimate, blocks_per_segment), estimate)
+        )
     return Problem(reducer(), tuple(records))
 
 
@@ -61,12 +71,16 @@ def noise_paths(rng, shape, step_s, noise: BenchNoise):
     phi = np.exp(-step_s / noise.correlation_time_s)
     drive = rng.standard_normal(shape) * np.sqrt(1 - phi**2)
     drive[..., 0] = rng.standard_normal(shape[:-1])
-    return noise.correlated_rad * lfilter([1], [1, -phi], drive, axis=-1) + noise.white_rad * rng.standard_normal(shape)
+    return noise.correlated_rad * lfilter(
+        [1], [1, -phi], drive, axis=-1
+    ) + noise.white_rad * rng.standard_normal(shape)
 
 
 def raw_covariance(samples, step_s, noise: BenchNoise):
     lag = np.abs(np.subtract.outer(np.arange(samples), np.arange(samples))) * step_s
-    return noise.correlated_rad**2 * np.exp(-lag / noise.correlation_time_s) + noise.white_rad**2 * np.eye(samples)
+    return noise.correlated_rad**2 * np.exp(-lag / noise.correlation_time_s) + noise.white_rad**2 * np.eye(
+        samples
+    )
 
 
 def kalman_whiten(columns, step_s, noise: BenchNoise):
@@ -105,7 +119,7 @@ class Laplace:
 
 
 def quadratic_difference(unit, difference):
-    """Shift of the mode in standard deviations and relative change of the precision that a log-density difference means."""
+    """Shift of the mode in sd and relative change of the precision that a log-density difference means."""
     n, d = unit.shape
     i, j = np.triu_indices(d)
     design = np.column_stack([np.ones(n), unit, unit[:, i] * unit[:, j]])

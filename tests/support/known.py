@@ -1,4 +1,4 @@
-"""Small known reducers, their prior draws and torque paths, shared by the tests of model, inference and indicators."""
+"""Small known reducers, their prior draws and torque paths, shared by several tests."""
 
 import numpy as np
 
@@ -18,7 +18,9 @@ def reducer(names=BASELINE, scale=SCALE):
 
 def prior_values(model, rng, draws):
     """Parameters by name, each (draws, 1), drawn from the prior."""
-    return {p.name: p.scaled_prior(model.scale).from_normal(rng.normal(size=(draws, 1))) for p in model.parameters}
+    return {
+        p.name: p.scaled_prior(model.scale).from_normal(rng.normal(size=(draws, 1))) for p in model.parameters
+    }
 
 
 def typical_values(model, z=0.3):

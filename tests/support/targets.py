@@ -9,7 +9,7 @@ CURVE, NARROW, SKEW = 0.5, 0.5, 6.0
 
 
 class Banana:
-    """x standard normal, y a bent ridge over x, w a normal all but cut off below zero (skew-normal), v plain normal."""
+    """x standard normal, y a bent ridge over x, w all but cut off below zero (skew-normal), v normal."""
 
     dimension = 4
     mean = np.array([0.0, 0.0, SKEW / np.sqrt(1 + SKEW**2) * np.sqrt(2 / np.pi), 1.0])
@@ -20,7 +20,13 @@ class Banana:
         z = np.atleast_2d(z)
         x, y, w, v = z.T
         bent = y - CURVE * (x**2 - 1)
-        return -0.5 * x**2 - 0.5 * (bent / NARROW) ** 2 - 0.5 * w**2 + log_ndtr(SKEW * w) - 0.5 * ((v - 1) / 2) ** 2
+        return (
+            -0.5 * x**2
+            - 0.5 * (bent / NARROW) ** 2
+            - 0.5 * w**2
+            + log_ndtr(SKEW * w)
+            - 0.5 * ((v - 1) / 2) ** 2
+        )
 
 
 def along_the_ridge():
@@ -47,7 +53,7 @@ def moments_by_importance(log_posterior, proposal, rng, draws=200_000):
 
 
 def disagreement(draws, mean, sd):
-    """Pulls and relative errors of means and sds over independent ensembles ``draws`` (ensembles, draws, dimension)."""
+    """Pulls and errors of means and sds over independent ensembles (ensembles, draws, dimension)."""
     count = draws.shape[0]
     pulls, errors = [], []
     for found, true in ((draws.mean(axis=1), mean), (draws.std(axis=1), sd)):
