@@ -53,13 +53,13 @@ def ours(problem, optimum, seconds=20.0):
     """Warm-up and sampling of this package until the time is up: ESS per second with and without warm-up."""
     rng = np.random.default_rng(0)
     began = time.perf_counter()
-    proposal, _ = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, Settings())
+    proposal, _ = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, Settings(), lambda: 1e9)
     warm = time.perf_counter() - began
     # Without thinning, so that nothing the sampler has drawn is thrown away.
     settings = Settings(kept_per_ensemble=10**6, refits=1)
     began = time.perf_counter()
     drawn = run_ensembles(
-        problem.log_posterior, proposal, rng, settings, lambda e: False, lambda: time.perf_counter() - began > seconds
+        problem.log_posterior, proposal, rng, settings, lambda e: False, lambda: began + seconds - time.perf_counter()
     )
     run = time.perf_counter() - began
     ess = min_ess(drawn.z)
@@ -162,8 +162,8 @@ def _jax_potential(problem):
     padded = np.zeros((bank.past.shape[0], path.torque_nm.size))
     padded[:, : bank.past.shape[1]] = bank.past
     neutral, torque, direction = jnp.asarray(bank.neutral), jnp.asarray(path.torque_nm), jnp.asarray(path.direction)
-    median, sigma, lo, width = np.ones((4, len(names)))
-    median[t.log], sigma[t.log], lo[t.even], width[t.even] = t.median, t.sigma, t.lo, t.width
+    floor, weight, sigma, lo, width = np.ones((5, len(names)))
+    floor[t.log], weight[t.log], sigma[t.log], lo[t.even], width[t.even] = t.floor, t.weight, t.sigma, t.lo, t.width
 
     def hats(nodes, mean, spread):
         positive = jnp.asarray(nodes[1:])
@@ -203,7 +203,7 @@ def _jax_potential(problem):
     whitener, measured = jnp.asarray(data.whitener), jnp.asarray(data.blocks.angle_rad)
 
     def potential(z):
-        physical = jnp.where(t.log, median * jnp.exp(sigma * z), lo + width * norm.cdf(z))
+        physical = jnp.where(t.log, 1 / (floor + weight * jnp.exp(-sigma * z)), lo + width * norm.cdf(z))
         residual = whitener @ (measured - angle(dict(zip(names, physical, strict=True))))
         chi2 = jnp.maximum(residual @ residual - problem.misfit, 0.0)
         return 0.5 * (problem.noise_dof + problem.dof) * jnp.log1p(chi2 / problem.noise_dof) + 0.5 * z @ z

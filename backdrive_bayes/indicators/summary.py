@@ -106,7 +106,7 @@ def _parameters_json(posterior, level):
 def _record_json(posterior, record, k, level):
     problem, z, weights = posterior.problem, posterior.z, posterior.weights
     data = problem.records[record]
-    torque = torque_grid(record_amplitude_nm(problem, record), (k * _rated(problem),))
+    torque = torque_grid(record_amplitude_nm(problem, record), (k * _rated(problem), _rated(problem)))
     bare = model_loops(problem, z, record, torque)
     full = bare
     if posterior.discrepancy.present:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,9 +77,11 @@ def diagnose_draws(names, draws, step, seconds: float) -> Convergence:
     """
     order = np.argsort(step, axis=1, kind="stable")
     in_time = np.take_along_axis(draws, order[..., None], axis=1)
+    # Undefined in some draws only: that is no constant, and nothing may be concluded from it.
+    broken = np.isnan(draws).any(axis=(0, 1)) & ~np.isnan(draws).all(axis=(0, 1))
     return Convergence(
         tuple(names),
-        _arviz("rhat", in_time),
+        np.where(broken, np.inf, _arviz("rhat", in_time)),
         _arviz("ess", draws, method="bulk"),
         _arviz("ess", draws, method="tail", prob=(0.05, 0.95)),
         seconds,
@@ -89,4 +92,7 @@ def _arviz(function, draws, **options):
     """One statistic of every quantity, shape (quantities,)."""
     from arviz_stats.base import array_stats
 
-    return np.asarray(getattr(array_stats, function)(draws, chain_axis=0, draw_axis=1, **options), float)
+    with warnings.catch_warnings():
+        # Of a constant the variance is zero; its NaN is dealt with above.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.asarray(getattr(array_stats, function)(draws, chain_axis=0, draw_axis=1, **options), float)

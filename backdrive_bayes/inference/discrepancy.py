@@ -64,9 +64,12 @@ def amplitude_nm(problem: Problem, record: int) -> float:
 
 
 def settled_path(half_nm) -> TorquePath:
-    """0 → +T → −T → +T along the rising torques ``half_nm`` (points,); the last 2·points − 1 samples are the loop."""
-    start = half_nm[half_nm > 0]
-    return TorquePath.from_samples(np.concatenate([[0.0], start, half_nm[::-1][1:], half_nm[1:]]))
+    """The second cycle along the rising torques ``half_nm`` (points,); the last 2·points − 1 samples are the loop.
+
+    The first cycle passes in three samples, for what a unit remembers of its past may outlive one tip.
+    """
+    ends = half_nm[[-1, 0]]
+    return TorquePath.from_samples(np.concatenate([[0.0], ends, half_nm[::-1], half_nm[1:]]))
 
 
 @dataclass(frozen=True, eq=False)

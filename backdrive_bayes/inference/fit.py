@@ -16,6 +16,7 @@ from backdrive_bayes.inference.optimum import Optimum, find_optimum, screen_star
 from backdrive_bayes.inference.problem import Problem, RecordData
 from backdrive_bayes.inference.sampling import Ensembles, Settings, run_ensembles, warm_up
 from backdrive_bayes.model.parameter import Scale
+from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import BASELINE, members_named
 from backdrive_bayes.records.branches import find_segments
@@ -23,6 +24,10 @@ from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import reduce_record
 
+NODES = 8
+"""Points within a block at which the model's curvature is averaged."""
+MOST_BLOCKS = 1200
+"""Blocks of all records together beyond which each record gets fewer."""
 BETTER_MODE = 5.0
 """Log posterior by which warm-up must beat the mode it started from for the fit to start again from there."""
 
@@ -76,10 +81,12 @@ def angle_scale_rad(unit: Unit) -> float:
     return 0.5 * max(float(np.ptp(r.angle_rad)) for r in unit.records)
 
 
-def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, blocks_per_segment: int = 120) -> Prepared:
+def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, blocks_per_segment: int | None = None) -> Prepared:
     """Reduce the records, find the mode and learn noise and discrepancy; ``scale`` overrides the priors' scale."""
     scale = scale or Scale(unit.rated_torque_nm, angle_scale_rad(unit))
     model = ReducerModel(members_named(baseline), scale)
+    # A loop from rest has two and a half legs.
+    blocks_per_segment = blocks_per_segment or int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 50, 120))
     segments = [find_segments(r.time_s, r.torque_nm) for r in unit.records]
     noise = estimate_common_noise(
         [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, s) for r, s in zip(unit.records, segments, strict=True)]
@@ -98,8 +105,8 @@ def _refine(problem, optimum) -> Prepared:
     slopes = [_slope(d.blocks, angle) for d, angle in zip(problem.records, angles, strict=True)]
     noise, path_sd = refine_noise(problem, optimum.z, discrepancy, slopes)
     records = tuple(
-        RecordData.prepare(_with_path_error(d.blocks, path_sd), n, s, d.path)
-        for d, n, s in zip(problem.records, noise, slopes, strict=True)
+        RecordData.prepare(_corrected(problem, optimum.z, r, path_sd), n, s, problem.records[r].path)
+        for r, (n, s) in enumerate(zip(noise, slopes, strict=True))
     )
     problem = replace(problem, records=records)
     optimum = find_optimum(problem, [optimum.z])
@@ -108,8 +115,27 @@ def _refine(problem, optimum) -> Prepared:
     return Prepared(problem, find_optimum(problem, [optimum.z]), discrepancy)
 
 
-def _with_path_error(blocks, path_sd):
-    return replace(blocks, torque_variance_nm2=np.maximum(blocks.torque_variance_nm2, path_sd**2))
+def _corrected(problem, z, record, path_sd):
+    """Blocks whose means are free of the model's curvature within a block, and with the torque path's extra error.
+
+    The likelihood compares a block's mean angle with the angle at its mean torque; on the shoulders of a cliff they differ.
+    """
+    data = problem.records[record]
+    blocks, path = data.blocks, data.path
+    ends = blocks.edges_nm()
+    share = (np.arange(NODES) + 0.5) / NODES
+    torque = ends[0][:, None] + (ends[1] - ends[0])[:, None] * share
+    torque += (blocks.torque_nm - torque.mean(axis=1))[:, None]
+    legs = tuple(replace(leg, start=leg.start * NODES, stop=leg.stop * NODES) for leg in path.legs)
+    values = problem.values(z, record)
+    fine = problem.model.angle(values, TorquePath(torque.ravel(), path.time_s, path.start_torque_nm, legs))
+    bend = fine.reshape(-1, NODES).mean(axis=1) - problem.model.angle(values, path)
+    return replace(
+        blocks,
+        angle_rad=blocks.angle_rad - (bend - blocks.bend_rad),
+        bend_rad=bend,
+        torque_variance_nm2=np.maximum(blocks.torque_variance_nm2, path_sd**2),
+    )
 
 
 def _slope(blocks, angle):
@@ -143,12 +169,16 @@ def fit(
 def _fit(unit, baseline, seed, settings, quantities, scale, progress) -> Posterior:
     began = time.perf_counter()
     rng = np.random.default_rng(seed)
+
+    def seconds_left() -> float:
+        return began + settings.max_seconds - time.perf_counter()
+
     progress("reducing the records and finding the posterior mode")
     prepared = prepare(unit, rng, baseline, scale)
     progress("warming up the ensembles")
     for _ in range(3):
         problem, optimum = prepared.problem, prepared.optimum
-        proposal, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, settings)
+        proposal, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, settings, seconds_left)
         if problem.log_posterior(best)[0] < optimum.log_posterior + BETTER_MODE:
             break
         prepared = _refine(problem, find_optimum(problem, [best]))
@@ -166,10 +196,7 @@ def _fit(unit, baseline, seed, settings, quantities, scale, progress) -> Posteri
         progress(_line(drawn, convergence))
         return convergence.outcome is Outcome.CONVERGED
 
-    deadline = began + settings.max_seconds
-    drawn = run_ensembles(
-        problem.log_posterior, proposal, rng, settings, enough, lambda: time.perf_counter() > deadline
-    )
+    drawn = run_ensembles(problem.log_posterior, proposal, rng, settings, enough, seconds_left)
     return Posterior(unit, problem, discrepancy, drawn, state["weights"], state["convergence"], seed)
 
 

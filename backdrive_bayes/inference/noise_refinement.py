@@ -16,7 +16,6 @@ from scipy.optimize import minimize
 from backdrive_bayes.inference.covariance import block_covariance
 from backdrive_bayes.inference.discrepancy import Discrepancy, angle_jacobian, prior_deviation
 from backdrive_bayes.inference.problem import Problem
-from backdrive_bayes.records.noise import NoiseEstimate
 
 RECORDS_USED = 3
 

@@ -120,19 +120,23 @@ def _block_angles(posterior, rng):
             angle = angle + weights @ posterior.discrepancy.basis_on(problem, r, data.path, first_leg=True).T
         angles.append(angle)
     chunks = [problem.offsets_rad(part) for part in np.array_split(posterior.z, max(1, posterior.z.shape[0] // 500))]
-    offsets = np.concatenate(chunks).reshape(*posterior.ensembles.z.shape[:2], -1)
+    offsets = np.concatenate(chunks)
+    if posterior.discrepancy.present:
+        # The offset is what is left of the data after model and discrepancy.
+        for r, data in enumerate(problem.records):
+            basis = posterior.discrepancy.basis_on(problem, r, data.path, first_leg=True)
+            offsets[:, r] -= posterior.weights @ (data.offset_weight @ basis)
+    offsets = offsets.reshape(*posterior.ensembles.z.shape[:2], -1)
     sd = np.array([d.offset_sd_rad for d in problem.records])
     return np.concatenate(angles, axis=-1), offsets + sd * rng.standard_normal(offsets.shape)
 
 
 def _replicates(posterior, angle, offsets, rng):
     """Replicated block means: angle + offset + noise with the block covariance, float32 (chain, draws, blocks)."""
-    from backdrive_bayes.inference.covariance import block_covariance
-
     problem, pick, out, column = posterior.problem, _thin(posterior), [], 0
     for r, data in enumerate(problem.records):
         n = data.blocks.count.size
-        lower = np.linalg.cholesky(block_covariance(data.blocks, data.noise))
+        lower = np.linalg.cholesky(data.covariance)
         noise = rng.standard_normal((*angle.shape[:2], n)) @ lower.T
         out.append(angle[..., column : column + n] + offsets[:, pick, r, None] + noise)
         column += n

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from backdrive_bayes.inference.covariance import block_covariance, whitener
-from backdrive_bayes.model.parameter import LogNormal, Parameter, Uniform
+from backdrive_bayes.model.parameter import BoundedLogNormal, Parameter, Uniform
 from backdrive_bayes.model.path import Leg, TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.records.noise import NoiseEstimate
@@ -34,6 +34,7 @@ class RecordData:
     blocks: Blocks
     noise: NoiseEstimate
     path: TorquePath
+    covariance: np.ndarray
     whitener: np.ndarray
     offset_weight: np.ndarray
     offset_sd_rad: float
@@ -41,14 +42,15 @@ class RecordData:
     @classmethod
     def prepare(cls, blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0, path=None) -> RecordData:
         """Whiten with the block covariance; ``slope_rad_per_nm`` as in ``block_covariance``."""
-        white = whitener(block_covariance(blocks, noise, slope_rad_per_nm))
+        covariance = block_covariance(blocks, noise, slope_rad_per_nm)
+        white = whitener(covariance)
         ones = white.sum(axis=1)
         norm = np.linalg.norm(ones)
         ones = ones / norm
         weight = ones @ white / norm
         # Taking the offset's direction out of the whitener marginalises the offset under a flat prior.
         white = white - np.outer(ones, ones @ white)
-        return cls(blocks, noise, path or path_of(blocks), white, weight, float(1 / norm))
+        return cls(blocks, noise, path or path_of(blocks), covariance, white, weight, float(1 / norm))
 
 
 def path_of(blocks: Blocks) -> TorquePath:
@@ -77,17 +79,20 @@ class Transform:
     """All coordinates from the standard-normal space to SI units at once."""
 
     def __init__(self, priors):
-        self.log = np.array([isinstance(p, LogNormal) for p in priors])
-        self.even = ~self.log
-        self.median = np.array([p.median for p in priors if isinstance(p, LogNormal)])
-        self.sigma = np.array([p.sigma for p in priors if isinstance(p, LogNormal)])
+        self.even = np.array([isinstance(p, Uniform) for p in priors])
+        self.log = ~self.even
+        log = [p for p in priors if not isinstance(p, Uniform)]
+        self.sigma = np.array([p.sigma for p in log])
+        # Every positive prior is 1 / (1 / hi + (1 / median - 1 / hi) exp(-sigma z)), without a bound 1 / hi is zero.
+        self.floor = np.array([1 / p.hi if isinstance(p, BoundedLogNormal) else 0.0 for p in log])
+        self.weight = np.array([1 / p.median for p in log]) - self.floor
         self.lo = np.array([p.lo for p in priors if isinstance(p, Uniform)])
         self.width = np.array([p.hi - p.lo for p in priors if isinstance(p, Uniform)])
 
     def from_normal(self, z):
         """Physical values, shape (…, dimension), of coordinates of that shape."""
         out = np.empty_like(z)
-        out[..., self.log] = self.median * np.exp(self.sigma * z[..., self.log])
+        out[..., self.log] = 1 / (self.floor + self.weight * np.exp(-self.sigma * z[..., self.log]))
         out[..., self.even] = self.lo + self.width * ndtr(z[..., self.even])
         return out
 

@@ -6,6 +6,7 @@ proposal (a Student-t mixture) and differential evolution. R-hat and ESS are tak
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import emcee
@@ -72,7 +73,7 @@ class Ensembles:
     proposal: StudentMixture
 
 
-def warm_up(log_posterior, mode, covariance, rng, settings: Settings):
+def warm_up(log_posterior, mode, covariance, rng, settings: Settings, seconds_left):
     """A proposal fitted to the posterior: by importance sampling where that works, else by differential evolution.
 
     Returns the proposal and the best point seen.
@@ -83,7 +84,7 @@ def warm_up(log_posterior, mode, covariance, rng, settings: Settings):
     sampler = _sampler(walkers, mode.size, log_posterior, [(DEMove(), 0.9), (DEMove(gamma0=1.0), 0.1)], rng)
     history = []
     for _ in range(settings.warm_up_blocks):
-        if share >= settings.good_share:
+        if share >= settings.good_share or seconds_left() <= 0:
             break
         sampler.reset()
         state = sampler.run_mcmc(state, settings.block, skip_initial_state_check=True)
@@ -125,8 +126,8 @@ def _starts(log_posterior, proposal, rng, walkers):
     return z[picked], z[np.argmax(value)]
 
 
-def run_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settings, enough, out_of_time) -> Ensembles:
-    """Independent ensembles until ``enough(Ensembles)`` or ``out_of_time()``.
+def run_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settings, enough, seconds_left) -> Ensembles:
+    """Independent ensembles until ``enough(Ensembles)`` or until ``seconds_left()`` is zero.
 
     While they have not converged, the proposal is refitted to what they drew; where that makes it clearly better, all is drawn
     anew, so that adaptation never enters the draws that are kept.
@@ -136,13 +137,15 @@ def run_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settin
     refits_left, steps = settings.refits, settings.block
     samplers, states = _begin(log_posterior, proposal, states, rng, settings)
     while True:
+        began = time.perf_counter()
         states = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)]
         drawn = _collect(samplers, proposal, settings.kept_per_ensemble)
-        if enough(drawn) or out_of_time():
+        if enough(drawn) or seconds_left() <= 0:
             return drawn
-        steps = max(steps, drawn.steps // 2)
+        affordable = int(seconds_left() * steps / (time.perf_counter() - began))
+        steps = max(10, min(max(steps, drawn.steps // 2), affordable))
         chains = [s.get_chain(flat=True) for s in samplers]
-        held_out = np.concatenate(chains[1::2])
+        held_out = np.concatenate(chains[1::2] or chains)
         held_out = held_out[:: max(1, held_out.shape[0] // 3000)]
         better, score = _refit(np.concatenate(chains[::2]), held_out, rng)
         # How likely the proposal finds the chain's own draws tells of regions that it misses; importance weights cannot.

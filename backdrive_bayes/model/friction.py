@@ -8,11 +8,11 @@ import numpy as np
 from scipy.special import ndtr
 
 from backdrive_bayes.model.member import Stage
-from backdrive_bayes.model.parameter import LogNormal, Parameter, Uniform
+from backdrive_bayes.model.parameter import BoundedLogNormal, Parameter, Uniform
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.play import play
 
-MESH = "weakly informative; losses of a few per cent a mesh and no-load torques in catalogues"
+MESH = "weakly informative; losses of a few per cent a mesh and no-load torques in catalogues, short of self-locking"
 LOAD_RATIOS = np.array([0.0, 0.015, 0.04, 0.08, 0.15, 0.3, 0.55, 0.9])
 CONSTANT_SHARES = np.r_[0.0, np.geomspace(0.002, 1.6, 12)]
 
@@ -30,9 +30,9 @@ class Friction:
     stage = Stage.TRANSMISSION
     source = "play operators for eq. (19)-(20), reconstructed; doi:10.1177/00202940261442382"
     parameters = (
-        Parameter("friction_torque", "N·m", "torque", LogNormal(0.03, 1.0), 0.0, MESH),
-        Parameter("friction_ratio", "1", "none", LogNormal(0.05, 1.0), 0.0, MESH),
-        Parameter("friction_spread", "1", "none", LogNormal(0.5, 0.5), None, "between one threshold and decades"),
+        Parameter("friction_torque", "N·m", "torque", BoundedLogNormal(0.03, 1.0, 0.6), 0.0, MESH),
+        Parameter("friction_ratio", "1", "none", BoundedLogNormal(0.05, 1.0, 0.7), 0.0, MESH),
+        Parameter("friction_spread", "1", "none", BoundedLogNormal(0.5, 0.5, 1.5), None, "between one threshold and a decade"),
         Parameter("free_share", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
         Parameter("initial_friction_state", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
     )
@@ -60,8 +60,9 @@ def hat_weights(nodes, mean, spread):
     ``nodes`` has shape (nodes,) and begins at 0; ``mean`` and ``spread`` have shape (…, 1). Returns shape (…, nodes), sums
     to 1. Each weight is the integral of a hat function over the density; mass beyond the last node goes to it.
     """
+    z = np.full(np.broadcast_shapes(np.shape(mean), nodes.shape), -np.inf)
     with np.errstate(divide="ignore"):
-        z = (np.log(nodes) - np.log(mean)) / spread
+        z[..., 1:] = (np.log(nodes[1:]) - np.log(mean)) / spread
     mass, moment = ndtr(z + 0.5 * spread), mean * ndtr(z - 0.5 * spread)
     gap = np.diff(nodes)
     d_mass, d_moment = np.diff(mass), np.diff(moment)

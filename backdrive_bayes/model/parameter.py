@@ -54,6 +54,28 @@ class Uniform:
 
 
 @dataclass(frozen=True)
+class BoundedLogNormal:
+    """Positive quantity below ``hi``: log-normal far below the bound (median, log-sd ``sigma``), logistic towards it."""
+
+    median: float
+    sigma: float
+    hi: float
+
+    def from_normal(self, z):
+        """Physical value of the standard-normal coordinate ``z`` (any shape)."""
+        return self.hi / (1 + (self.hi / self.median - 1) * np.exp(-self.sigma * np.asarray(z)))
+
+    def to_normal(self, value):
+        """Standard-normal coordinate of a physical value (any shape) below the bound."""
+        odds = (self.hi / np.asarray(value) - 1) / (self.hi / self.median - 1)
+        return -np.log(odds) / self.sigma
+
+    def describe(self) -> str:
+        """One phrase for reports."""
+        return f"log-normal, median {self.median:.4g}, log-sd {self.sigma:.3g}, below {self.hi:.4g}"
+
+
+@dataclass(frozen=True)
 class Scale:
     """The two scales that a unit's priors are stated in: rated torque [N·m] and an angle scale [rad]."""
 
@@ -73,12 +95,12 @@ class Parameter:
     name: str
     unit: str
     dimension: str
-    prior: LogNormal | Uniform
+    prior: LogNormal | BoundedLogNormal | Uniform
     null: float | None
     source: str
     per_record: bool = False
 
-    def scaled_prior(self, scale: Scale) -> LogNormal | Uniform:
+    def scaled_prior(self, scale: Scale) -> LogNormal | BoundedLogNormal | Uniform:
         """The prior in SI units for a reducer of the given scale."""
         factor = {
             "torque": scale.torque_nm,
@@ -88,4 +110,6 @@ class Parameter:
         }[self.dimension]
         if isinstance(self.prior, LogNormal):
             return LogNormal(self.prior.median * factor, self.prior.sigma)
+        if isinstance(self.prior, BoundedLogNormal):
+            return BoundedLogNormal(self.prior.median * factor, self.prior.sigma, self.prior.hi * factor)
         return Uniform(self.prior.lo * factor, self.prior.hi * factor)

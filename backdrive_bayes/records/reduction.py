@@ -23,6 +23,7 @@ class Blocks:
     ``torque_nm`` is the smooth torque path at the block, ``torque_variance_nm2`` what is left of the torque channel's noise in it;
     ``begin_s`` and ``end_s`` bound the block in time, ``count`` is its number of samples. ``leg`` numbers the
     monotone legs, ``turning_nm`` (shape (legs + 1,)) are the torques at their ends, ``direction`` (legs,) is ±1.
+    ``bend_rad`` is what has been taken off the mean angle for the curve's bend within the block.
     """
 
     name: str
@@ -35,11 +36,22 @@ class Blocks:
     leg: np.ndarray
     turning_nm: np.ndarray
     direction: np.ndarray
+    bend_rad: np.ndarray
 
     @property
     def mid_s(self) -> np.ndarray:
         """Time at the middle of each block [s]."""
         return 0.5 * (self.begin_s + self.end_s)
+
+    def edges_nm(self) -> np.ndarray:
+        """Torque at the beginning and the end of each block along the path [N·m], shape (2, blocks)."""
+        edges = np.empty((2, self.torque_nm.size))
+        for k in range(self.direction.size):
+            own = self.leg == k
+            time = np.r_[self.begin_s[own][0], self.mid_s[own], self.end_s[own][-1]]
+            torque = np.r_[self.turning_nm[k], self.torque_nm[own], self.turning_nm[k + 1]]
+            edges[:, own] = np.interp([self.begin_s[own], self.end_s[own]], time, torque)
+        return edges
 
 
 def reduce_record(record: Record, segments, noise: NoiseEstimate, blocks_per_segment: int = 200) -> Blocks:
@@ -72,6 +84,7 @@ def reduce_record(record: Record, segments, noise: NoiseEstimate, blocks_per_seg
         leg=np.array(leg),
         turning_nm=turning,
         direction=np.array([s.direction for s in segments]),
+        bend_rad=np.zeros(count.size),
     )
 
 
