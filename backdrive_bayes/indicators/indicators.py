@@ -95,10 +95,10 @@ def back_drive(loops: Loops, load_nm: float):
     """
     load = min(load_nm, float(loops.torque_nm[-1]))
     angle = _at(loops, loops.rising, load) - _at(loops, loops.rising, 0.0)
-    torque = loops.torque_nm
-    middle = 0.5 * (torque[1:] + torque[:-1])
-    part = (middle > 0) & (torque[1:] <= load * (1 + 1e-9))
-    return angle, np.diff(loops.rising, axis=1)[:, part] @ middle[part]
+    within = (loops.torque_nm >= 0) & (loops.torque_nm < load)
+    torque = np.append(loops.torque_nm[within], load)
+    rising = np.column_stack([loops.rising[:, within], _at(loops, loops.rising, load)])
+    return angle, np.diff(rising, axis=1) @ (0.5 * (torque[1:] + torque[:-1]))
 
 
 def _at(loops, curve, torque):

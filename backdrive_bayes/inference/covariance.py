@@ -16,7 +16,8 @@ def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0)
     part falls with the number of samples; the torque path's error enters through ``slope_rad_per_nm`` (blocks,).
     """
     n, span = blocks.count, blocks.end_s - blocks.begin_s
-    decay = span / n / noise.correlation_time_s
+    # Samples some hundred correlation times apart are independent to the last bit.
+    decay = np.minimum(span / n / noise.correlation_time_s, 500.0)
     # expm1 keeps the sums accurate for samples much closer than the correlation time.
     total = np.expm1(-n * decay) / np.expm1(-decay)
     apart = np.abs(blocks.mid_s[:, None] - blocks.mid_s[None, :]) - 0.5 * (span[:, None] + span[None, :])

@@ -105,7 +105,7 @@ def _refine(problem, optimum) -> Prepared:
     slopes = [_slope(d.blocks, angle) for d, angle in zip(problem.records, angles, strict=True)]
     noise, path_sd = refine_noise(problem, optimum.z, discrepancy, slopes)
     records = tuple(
-        RecordData.prepare(_corrected(problem, optimum.z, r, path_sd), n, s, problem.records[r].path)
+        RecordData.prepare(corrected_blocks(problem, optimum.z, r, path_sd), n, s, problem.records[r].path)
         for r, (n, s) in enumerate(zip(noise, slopes, strict=True))
     )
     problem = replace(problem, records=records)
@@ -115,7 +115,7 @@ def _refine(problem, optimum) -> Prepared:
     return Prepared(problem, find_optimum(problem, [optimum.z]), discrepancy)
 
 
-def _corrected(problem, z, record, path_sd):
+def corrected_blocks(problem: Problem, z, record: int, path_sd: float = 0.0):
     """Blocks whose means are free of the model's curvature within a block, and with the torque path's extra error.
 
     The likelihood compares a block's mean angle with the angle at its mean torque; on the shoulders of a cliff they differ.

@@ -134,9 +134,6 @@ def test_back_drive_on_an_ellipse():
     np.testing.assert_allclose(energy, A * 0.06**2 / 2 + B * T * bow, rtol=1e-3)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the energy leaves out the last strip where the load is no grid torque"
-)
 def test_back_drive_energy_of_any_load():
     angle, energy = ind.back_drive(parallelogram(HALF, torque_grid(T)), 0.093)
     np.testing.assert_allclose(angle, A * 0.093, rtol=1e-9)

@@ -26,8 +26,5 @@ def test_replicates_sit_on_the_data_where_the_model_is_true():
     assert offset_gap(("geometric", "elastic", "friction")) < 3
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the offset is drawn as if there were no discrepancy, and the discrepancy added to it"
-)
 def test_replicates_sit_on_the_data_where_there_is_model_error():
     assert offset_gap(("elastic",)) < 3

@@ -61,12 +61,7 @@ def test_parameter_names_are_unique_over_the_registry():
     assert len(names) == len(set(names))
 
 
-NULL_IS_NAN = pytest.mark.xfail(strict=True, reason="hat_weights gives NaN at a mean of exactly zero")
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=NULL_IS_NAN) if n == "friction" else n for n in NAMES]
-)
+@pytest.mark.parametrize("name", NAMES)
 def test_member_is_absent_at_its_null_value(name):
     member = MEMBERS[name]
     assert null_gap(member, zigzag(), nulls_of(member)) < 1e-12

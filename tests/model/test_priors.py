@@ -2,18 +2,38 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom, kstest, lognorm, uniform
+from scipy.stats import binom, kstest, lognorm, norm, uniform
 from support.known import SCALE, reducer
 
-from backdrive_bayes.model.parameter import LogNormal, Parameter, Uniform
+from backdrive_bayes.model.parameter import BoundedLogNormal, LogNormal, Parameter, Uniform
 
 PRIORS = {p.name: p.scaled_prior(SCALE) for p in reducer().parameters}
+
+
+class LogitNormal:
+    """log(x / (hi - x)) is normal: median at the stated median, log-sd as stated far below the bound."""
+
+    def __init__(self, prior):
+        self.hi = prior.hi
+        self.normal = norm(np.log(prior.median / (prior.hi - prior.median)), prior.sigma)
+
+    def cdf(self, x):
+        return self.normal.cdf(np.log(x / (self.hi - x)))
+
+    def ppf(self, share):
+        odds = np.exp(self.normal.ppf(share))
+        return self.hi * odds / (1 + odds)
+
+    def median(self):
+        return self.ppf(0.5)
 
 
 def stated(prior):
     """The distribution the prior says it is, from SciPy."""
     if isinstance(prior, LogNormal):
         return lognorm(prior.sigma, scale=prior.median)
+    if isinstance(prior, BoundedLogNormal):
+        return LogitNormal(prior)
     return uniform(prior.lo, prior.hi - prior.lo)
 
 

@@ -38,9 +38,6 @@ def test_a_creeping_angle_would_not_close():
     assert tip_gap(angle + creep, 40).min() > 1e-9
 
 
-@pytest.mark.xfail(
-    strict=True, reason="settled_path runs one loop, but a past state can need one loop to be forgotten"
-)
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
 def test_the_path_that_indicators_use_is_settled(share):
     grid = torque_grid(share * RATED)

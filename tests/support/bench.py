@@ -57,7 +57,7 @@ def even_blocks(samples, size, step_s=1e-3) -> Blocks:
     begin = (edges[:-1] - 0.5) * step_s
     return Blocks(
         "even", np.zeros(n), np.zeros(n), np.zeros(n), begin, begin + count * step_s, count,
-        np.zeros(n, int), np.array([0.0, 1.0]), np.array([1]),
+        np.zeros(n, int), np.array([0.0, 1.0]), np.array([1]), np.zeros(n),
     )  # fmt: skip
 
 
