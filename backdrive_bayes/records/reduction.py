@@ -113,11 +113,14 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
     mid = np.add.reduceat(record.time_s, starts) / count
     path, variance = np.empty_like(mean), np.empty_like(mean)
     ends = np.empty((len(segments), 2))
+    # Turning points lie between the last sample of one segment and the first of the next.
+    inner = [0.5 * (record.time_s[s.start - 1] + record.time_s[s.start]) for s in segments[1:]]
+    corner = np.r_[record.time_s[0], inner, record.time_s[-1]]
     for k, s in enumerate(segments):
         own = leg == k
         bounds = record.time_s[[s.start, s.stop - 1]]
         trend = _trend(mid[own], mean[own], count[own], torque_sd, bounds)
-        level, at_ends = trend(mid[own]), trend(bounds)
+        level, at_ends = trend(mid[own]), trend(corner[k : k + 2])
         excess = np.mean(count[own] * (mean[own] - level) ** 2) / max(torque_sd, 1e-300) ** 2 - 1
         # Wiener weight of a block mean against the trend: what varies beyond the sensor's white noise is real torque.
         keep = max(excess, 0.0) / (max(excess, 0.0) + 1.0) if excess > 5 / np.sqrt(own.sum()) else 0.0
