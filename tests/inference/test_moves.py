@@ -94,10 +94,10 @@ def run(seed, walkers=WALKERS):
     settings = Settings(
         ensembles=ENSEMBLES, walkers=walkers, block=150, kept_per_ensemble=20_000, good_share=0.9
     )
-    proposal, best = warm_up(Banana.log_posterior, Banana.mean, np.diag(Banana.sd**2), rng, settings)
+    proposal, best = warm_up(Banana.log_posterior, Banana.mean, np.diag(Banana.sd**2), rng, settings, lambda: 1e9)
     assert Banana.log_posterior(best)[0] > Banana.log_posterior(Banana.mean)[0] - 5
     return run_ensembles(
-        Banana.log_posterior, proposal, rng, settings, lambda drawn: drawn.steps >= 700, lambda: False
+        Banana.log_posterior, proposal, rng, settings, lambda drawn: drawn.steps >= 700, lambda: 1e9
     )
 
 
@@ -131,7 +131,7 @@ def test_a_seed_fixes_every_draw_and_kept_draws_are_bounded():
 
     def once(seed):
         return run_ensembles(
-            Banana.log_posterior, RIDGE, np.random.default_rng(seed), settings, lambda d: False, lambda: True
+            Banana.log_posterior, RIDGE, np.random.default_rng(seed), settings, lambda d: False, lambda: 0.0
         )
 
     a, b, c = once(5), once(5), once(6)
