@@ -77,6 +77,9 @@ def true_indicators(model, values, amplitude) -> dict:
         def values(self, z, record):
             return {k: np.array([[v]]) for k, v in values.items()}
 
+        def loading_rate_nm_per_s(self, record):
+            return 1.0
+
     loops: Loops = model_loops(Known(), np.zeros((1, 1)), 0, torque)
     return {k: float(v[0]) for k, v in core_indicators(loops, K * RATED).items()}
 

@@ -32,31 +32,34 @@ class Loops:
 
 def torque_grid(amplitude: float, exact=()) -> np.ndarray:
     """Odd-symmetric torques from -T to +T, dense around zero, that hold zero and ±``exact`` [N·m]."""
-    half = amplitude * np.sinh(np.linspace(0, 4, POINTS // 2 + 1)) / np.sinh(4)
+    half = np.sinh(np.linspace(0, 4, POINTS // 2 + 1))
+    # Divided by its own end, not by sinh(4): numpy's scalar and vector sinh may differ in the last bit.
+    half = amplitude * (half / half[-1])
     extra = [abs(t) for t in exact if 0 < abs(t) < amplitude]
     half = np.unique(np.concatenate([half, extra]))
     return np.concatenate([-half[:0:-1], half])
 
 
 def model_loops(problem: Problem, z, record: int, torque) -> Loops:
-    """The model's settled loops on ``torque`` (points,) for draws ``z`` (draws, dimension)."""
-    path = settled_path(torque)
-    return _cut(torque, _in_chunks(lambda v: problem.model.angle(v, path), problem, z, record))
+    """The reducer's settled loops on ``torque`` (points,) at the record's rate for draws ``z`` (draws, dimension)."""
+    path, reducer = settled_path(torque, problem.loading_rate_nm_per_s(record)), problem.model.reducer
+    return _cut(torque, _in_chunks(lambda v: reducer.angle(v, path), problem, z, record))
 
 
 def module_loops(problem: Problem, z, record: int, torque) -> dict[str, Loops]:
     """The loops of each module alone, by its name; they add up to :func:`model_loops`."""
-    path = settled_path(torque)
+    path, reducer = settled_path(torque, problem.loading_rate_nm_per_s(record)), problem.model.reducer
     pieces: dict[str, list] = {}
     for a in range(0, len(z), CHUNK):
-        for name, angle in problem.model.parts(problem.values(z[a : a + CHUNK], record), path).items():
+        for name, angle in reducer.parts(problem.values(z[a : a + CHUNK], record), path).items():
             pieces.setdefault(name, []).append(np.broadcast_to(angle, (len(z[a : a + CHUNK]), path.torque_nm.size)))
     return {name: _cut(torque, np.concatenate(angle)) for name, angle in pieces.items()}
 
 
 def discrepancy_loops(problem: Problem, discrepancy: Discrepancy, weights, record: int, torque) -> Loops:
     """The discrepancy on the same loops for coefficients ``weights`` (draws, terms)."""
-    basis = discrepancy.basis_on(problem, record, settled_path(torque))
+    path = settled_path(torque, problem.loading_rate_nm_per_s(record))
+    basis = discrepancy.basis_on(problem, record, path, model=problem.model.reducer)
     return _cut(torque, weights @ basis.T)
 
 

@@ -25,6 +25,7 @@ ROUGHNESS = (1.0, 2.0)
 """Spectral exponents: Matérn-1/2, which may have kinks, and Matérn-3/2, which is smooth."""
 RELATIVE_SCALES = np.geomspace(1e-5, 0.3, 31)
 PROBE = 1e-4
+SETTLING_CYCLES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +41,8 @@ class LoopCoordinate:
         """From the model's own settled loop at coordinates ``z``."""
         amplitude = amplitude_nm(problem, record)
         half = amplitude * np.sinh(np.linspace(-3, 3, 201)) / np.sinh(3)
-        path = settled_path(half)
-        angle = problem.model.angle(problem.values(z, record), path)[-2 * half.size + 1 :]
+        path = settled_path(half, problem.loading_rate_nm_per_s(record))
+        angle = problem.model.reducer.angle(problem.values(z, record), path)[-2 * half.size + 1 :]
         falling, rising = angle[: half.size][::-1], angle[half.size - 1 :]
         return cls(half, _progress(half, falling), _progress(half, rising))
 
@@ -63,13 +64,15 @@ def amplitude_nm(problem: Problem, record: int) -> float:
     return 0.5 * float(np.ptp(problem.records[record].blocks.turning_nm))
 
 
-def settled_path(half_nm) -> TorquePath:
-    """The second cycle along the rising torques ``half_nm`` (points,); the last 2·points − 1 samples are the loop.
+def settled_path(half_nm, rate_nm_per_s: float = 1.0) -> TorquePath:
+    """A settled cycle along the rising torques ``half_nm`` (points,); the last 2·points − 1 samples are the loop.
 
-    The first cycle passes in three samples, for what a unit remembers of its past may outlive one tip.
+    The cycles before it pass from tip to tip, for what a unit remembers of its past may outlive one tip.
     """
     ends = half_nm[[-1, 0]]
-    return TorquePath.from_samples(np.concatenate([[0.0], ends, half_nm[::-1], half_nm[1:]]))
+    torque = np.concatenate([[0.0], *[ends] * SETTLING_CYCLES, half_nm[::-1], half_nm[1:]])
+    time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(torque)))]) / rate_nm_per_s
+    return TorquePath.from_samples(torque, time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,19 +120,22 @@ class Discrepancy:
         """One record's own basis before the parameters' directions are taken out, shape (samples, terms of a record)."""
         return _basis(self.coordinates[record], path, first_leg=True)
 
-    def basis_on(self, problem: Problem, record: int, path: TorquePath, first_leg=False) -> np.ndarray:
-        """Orthogonal basis at the samples of ``path`` in the state of ``record``, shape (samples, terms)."""
+    def basis_on(self, problem: Problem, record: int, path: TorquePath, first_leg=False, model=None) -> np.ndarray:
+        """Orthogonal basis at the samples of ``path`` in the state of ``record``, shape (samples, terms).
+
+        ``model`` (default: the problem's own) is the part of the model whose angle the basis belongs to.
+        """
         raw = _basis(self.coordinates[record], path, first_leg)
         width = raw.shape[1]
         full = np.zeros((raw.shape[0], self.factor.shape[0]))
         full[:, record * width : (record + 1) * width] = raw
-        return full - angle_jacobian(problem, self.optimum.z, record, path) @ self.absorbed
+        return full - angle_jacobian(problem, self.optimum.z, record, path, model) @ self.absorbed
 
 
-def angle_jacobian(problem: Problem, z, record: int, path: TorquePath) -> np.ndarray:
-    """Derivative of the model's angle [rad] by the coordinates, shape (samples, dimension)."""
+def angle_jacobian(problem: Problem, z, record: int, path: TorquePath, model=None) -> np.ndarray:
+    """Derivative of the angle [rad] of the whole model, or of ``model``, by the coordinates, shape (samples, dimension)."""
     probes = np.concatenate([z + PROBE * np.eye(z.size), z - PROBE * np.eye(z.size)])
-    angle = problem.model.angle(problem.values(probes, record), path)
+    angle = (model or problem.model).angle(problem.values(probes, record), path)
     return (angle[: z.size] - angle[z.size :]).T / (2 * PROBE)
 
 

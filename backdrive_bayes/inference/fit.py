@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from backdrive_bayes.inference.chain_file import Unfinished
 from backdrive_bayes.inference.diagnostics import Convergence, Outcome, diagnose_draws
 from backdrive_bayes.inference.discrepancy import Discrepancy, learn_discrepancy
 from backdrive_bayes.inference.noise_refinement import refine_noise
 from backdrive_bayes.inference.optimum import Optimum, find_optimum, screen_starts
 from backdrive_bayes.inference.problem import Problem, RecordData
-from backdrive_bayes.inference.sampling import Ensembles, Settings, run_ensembles, warm_up
+from backdrive_bayes.inference.sampling import Ensembles, Settings, continue_ensembles, run_ensembles, warm_up
 from backdrive_bayes.model.parameter import Scale
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
@@ -37,7 +38,7 @@ class Posterior:
     """Draws of one unit's parameters with all that is needed to turn them into loops.
 
     ``z`` (ensembles, draws, dimension) are coordinates of ``problem``; ``discrepancy_weights`` (ensembles, draws, terms)
-    belong to the same draws.
+    belong to the same draws. ``restarts`` (times, dimension) are the points at which the fit began again from a better mode.
     """
 
     unit: Unit
@@ -47,6 +48,7 @@ class Posterior:
     discrepancy_weights: np.ndarray
     convergence: Convergence
     seed: int
+    restarts: np.ndarray
 
     @property
     def z(self) -> np.ndarray:
@@ -128,7 +130,8 @@ def corrected_blocks(problem: Problem, z, record: int, path_sd: float = 0.0):
     torque += (blocks.torque_nm - torque.mean(axis=1))[:, None]
     legs = tuple(replace(leg, start=leg.start * NODES, stop=leg.stop * NODES) for leg in path.legs)
     values = problem.values(z, record)
-    fine = problem.model.angle(values, TorquePath(torque.ravel(), path.time_s, path.start_torque_nm, legs))
+    time = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
+    fine = problem.model.angle(values, TorquePath(torque.ravel(), time.ravel(), path.start_torque_nm, legs))
     bend = fine.reshape(-1, NODES).mean(axis=1) - problem.model.angle(values, path)
     return replace(
         blocks,
@@ -154,20 +157,23 @@ def fit(
     settings: Settings | None = None,
     quantities: Quantities | None = None,
     scale: Scale | None = None,
+    resume: Unfinished | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Posterior:
     """Posterior of one unit.
 
     ``quantities`` names further quantities of the draws (indicators) that must converge too. Sampling stops when every
-    parameter and quantity has converged or the settings' budget is spent; the outcome says which.
+    parameter and quantity has converged or the settings' budget is spent; the outcome says which. ``resume`` goes on with a fit
+    of the same unit, baseline and seed whose budget was spent; BadInput where it is of another.
     """
     # The arrays are small: BLAS threads would spend their time waiting for each other.
     with threadpool_limits(1, user_api="blas"):
-        return _fit(unit, baseline, seed, settings or Settings(), quantities, scale, progress)
+        return _fit(unit, baseline, seed, settings or Settings(), quantities, scale, resume, progress)
 
 
-def _fit(unit, baseline, seed, settings, quantities, scale, progress) -> Posterior:
+def _fit(unit, baseline, seed, settings, quantities, scale, resume, progress) -> Posterior:
     began = time.perf_counter()
+    before = resume.seconds if resume else 0.0
     rng = np.random.default_rng(seed)
 
     def seconds_left() -> float:
@@ -175,29 +181,51 @@ def _fit(unit, baseline, seed, settings, quantities, scale, progress) -> Posteri
 
     progress("reducing the records and finding the posterior mode")
     prepared = prepare(unit, rng, baseline, scale)
-    progress("warming up the ensembles")
+    if resume:
+        restarts = resume.restarts
+        for best in restarts:
+            prepared = _from_better_mode(prepared, best)
+        chains = resume.chains(prepared.problem.log_posterior)
+    else:
+        progress("warming up the ensembles")
+        prepared, proposal, restarts = _warmed_up(prepared, rng, settings, seconds_left)
+    problem, discrepancy = prepared.problem, prepared.discrepancy
+    state: dict = {}
+
+    def enough(drawn: Ensembles) -> bool:
+        seconds = before + time.perf_counter() - began
+        state["weights"] = _draw_weights(problem, discrepancy, drawn, seed)
+        convergence = diagnose_draws(problem.labels, drawn.z, drawn.step, seconds)
+        if convergence.outcome is Outcome.CONVERGED and quantities is not None:
+            names, values = _quantity_draws(problem, discrepancy, drawn, state["weights"], quantities)
+            convergence = convergence.joined(diagnose_draws(names, values, drawn.step, seconds))
+        state["convergence"] = convergence
+        progress(_line(drawn, convergence))
+        return convergence.outcome is Outcome.CONVERGED
+
+    if resume:
+        rng = np.random.default_rng([seed, 3, chains.samplers[0].iteration])
+        drawn = continue_ensembles(problem.log_posterior, chains, rng, settings, enough, seconds_left)
+    else:
+        drawn = run_ensembles(problem.log_posterior, proposal, rng, settings, enough, seconds_left)
+    return Posterior(unit, problem, discrepancy, drawn, state["weights"], state["convergence"], seed, restarts)
+
+
+def _warmed_up(prepared, rng, settings, seconds_left):
+    """The problem at the best mode that warm-up knows, a proposal, and the points (times, dimension) that were better modes."""
+    restarts = []
     for _ in range(3):
         problem, optimum = prepared.problem, prepared.optimum
         proposal, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, settings, seconds_left)
         if problem.log_posterior(best)[0] < optimum.log_posterior + BETTER_MODE:
             break
-        prepared = _refine(problem, find_optimum(problem, [best]))
-    problem, discrepancy = prepared.problem, prepared.discrepancy
-    state: dict = {}
+        restarts.append(best)
+        prepared = _from_better_mode(prepared, best)
+    return prepared, proposal, np.reshape(restarts, (-1, prepared.problem.dimension))
 
-    def enough(drawn: Ensembles) -> bool:
-        state["weights"] = _draw_weights(problem, discrepancy, drawn, seed)
-        convergence = diagnose_draws(problem.labels, drawn.z, drawn.step, time.perf_counter() - began)
-        if convergence.outcome is Outcome.CONVERGED and quantities is not None:
-            names, values = _quantity_draws(problem, discrepancy, drawn, state["weights"], quantities)
-            more = diagnose_draws(names, values, drawn.step, time.perf_counter() - began)
-            convergence = convergence.joined(more)
-        state["convergence"] = convergence
-        progress(_line(drawn, convergence))
-        return convergence.outcome is Outcome.CONVERGED
 
-    drawn = run_ensembles(problem.log_posterior, proposal, rng, settings, enough, seconds_left)
-    return Posterior(unit, problem, discrepancy, drawn, state["weights"], state["convergence"], seed)
+def _from_better_mode(prepared, best) -> Prepared:
+    return _refine(prepared.problem, find_optimum(prepared.problem, [best]))
 
 
 def _draw_weights(problem, discrepancy, drawn, seed):

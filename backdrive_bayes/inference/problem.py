@@ -11,10 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import ndtr
 
 from backdrive_bayes.inference.covariance import block_covariance, whitener
-from backdrive_bayes.model.parameter import BoundedLogNormal, Parameter, Uniform
+from backdrive_bayes.model.parameter import Parameter
 from backdrive_bayes.model.path import Leg, TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.records.noise import NoiseEstimate
@@ -76,25 +75,26 @@ class Coordinate:
 
 
 class Transform:
-    """All coordinates from the standard-normal space to SI units at once."""
+    """All coordinates from the standard-normal space to SI units at once, kind by kind of prior."""
 
     def __init__(self, priors):
-        self.even = np.array([isinstance(p, Uniform) for p in priors])
-        self.log = ~self.even
-        log = [p for p in priors if not isinstance(p, Uniform)]
-        self.sigma = np.array([p.sigma for p in log])
-        # Every positive prior is 1 / (1 / hi + (1 / median - 1 / hi) exp(-sigma z)), without a bound 1 / hi is zero.
-        self.floor = np.array([1 / p.hi if isinstance(p, BoundedLogNormal) else 0.0 for p in log])
-        self.weight = np.array([1 / p.median for p in log]) - self.floor
-        self.lo = np.array([p.lo for p in priors if isinstance(p, Uniform)])
-        self.width = np.array([p.hi - p.lo for p in priors if isinstance(p, Uniform)])
+        kinds = dict.fromkeys(type(p) for p in priors)
+        self.groups = [
+            (np.array([i for i, p in enumerate(priors) if type(p) is kind]), _stacked([p for p in priors if type(p) is kind]))
+            for kind in kinds
+        ]
 
     def from_normal(self, z):
         """Physical values, shape (…, dimension), of coordinates of that shape."""
         out = np.empty_like(z)
-        out[..., self.log] = 1 / (self.floor + self.weight * np.exp(-self.sigma * z[..., self.log]))
-        out[..., self.even] = self.lo + self.width * ndtr(z[..., self.even])
+        for columns, prior in self.groups:
+            out[..., columns] = prior.from_normal(z[..., columns])
         return out
+
+
+def _stacked(priors):
+    """One prior of the same kind whose numbers are arrays over ``priors``."""
+    return type(priors[0])(**{k: np.array([getattr(p, k) for p in priors]) for k in vars(priors[0])})
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +138,11 @@ class Problem:
             for i, c in enumerate(self.coordinates)
             if c.record is None or c.record == record
         }
+
+    def loading_rate_nm_per_s(self, record: int) -> float:
+        """Mean loading rate |dτ/dt| of a record [N·m/s]."""
+        blocks = self.records[record].blocks
+        return float(np.abs(np.diff(blocks.turning_nm)).sum() / (blocks.end_s[-1] - blocks.begin_s[0]))
 
     def residuals(self, z) -> list[np.ndarray]:
         """Whitened residuals of each record, shape (…, blocks), with the offset projected out."""

@@ -19,6 +19,7 @@ class Elastic:
 
     name = "elastic"
     stage = Stage.COMPLIANCE
+    signature = "angle in proportion to torque, on all branches alike"
     source = "eq. (17)-(18), reconstructed; doi:10.1177/00202940261442382"
     parameters = (
         Parameter("compliance", "rad/(N·m)", "compliance", LogNormal(0.6, 1.0), 0.0, STEEL_TO_PLASTIC),

@@ -14,6 +14,8 @@ from backdrive_bayes.model.play import play
 
 MESH = "weakly informative; losses of a few per cent a mesh and no-load torques in catalogues, short of self-locking"
 LOAD_RATIOS = np.array([0.0, 0.015, 0.04, 0.08, 0.15, 0.3, 0.55, 0.9])
+SHIFT_STEP = 0.02
+"""Step in T_r between the errors of the torque reading for which the bank is made; between them it is interpolated."""
 CONSTANT_SHARES = np.r_[0.0, np.geomspace(0.002, 1.6, 12)]
 
 
@@ -28,6 +30,7 @@ class Friction:
 
     name = "friction"
     stage = Stage.TRANSMISSION
+    signature = "a loop whose width grows with the load, closed at its tips, independent of the rate"
     source = "play operators for eq. (19)-(20), reconstructed; doi:10.1177/00202940261442382"
     parameters = (
         Parameter("friction_torque", "N·m", "torque", BoundedLogNormal(0.03, 1.0, 0.6), 0.0, MESH),
@@ -39,7 +42,6 @@ class Friction:
 
     def respond(self, values, drive):
         """Transmitted torque [N·m] of shape (…, samples)."""
-        bank = _bank(drive.path, drive.rated_torque_nm)
         spread, start = values["friction_spread"], values["initial_friction_state"]
         constant = hat_weights(CONSTANT_SHARES, values["friction_torque"] / drive.rated_torque_nm, spread)
         load = hat_weights(LOAD_RATIOS, values["friction_ratio"], spread)
@@ -48,10 +50,10 @@ class Friction:
         weights *= 1 - free
         # The first element of the bank has no threshold: it passes the torque as it is.
         weights[..., :1] += free
-        passed = np.matmul(weights, bank.neutral)
         past = np.concatenate([weights * np.maximum(start, 0), weights * np.maximum(-start, 0)], axis=-1)
-        passed[..., : bank.past.shape[-1]] += np.matmul(past, bank.past)
-        return passed
+        if np.ndim(drive.shift_nm) == 0:
+            return _bank(drive.path, drive.rated_torque_nm, 0).passed(weights, past)
+        return _passed_shifted(drive, weights, past)
 
 
 def hat_weights(nodes, mean, spread):
@@ -74,6 +76,23 @@ def hat_weights(nodes, mean, spread):
     return weights
 
 
+def _passed_shifted(drive, weights, past):
+    """Transmitted torque with the torque reading in error, between the banks of the two nearest shifts."""
+    shape = np.broadcast_shapes(weights.shape[:-1], np.shape(drive.shift_nm)[:-1])
+    weights, past, place = (
+        np.broadcast_to(x, (*shape, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1])
+        for x in (weights, past, drive.shift_nm / (SHIFT_STEP * drive.rated_torque_nm))
+    )
+    passed = np.zeros((place.size, drive.path.torque_nm.size))
+    for node in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
+        hat = np.maximum(1 - np.abs(place - node), 0)
+        own = hat[:, 0] > 0
+        if own.any():
+            bank = _bank(drive.path, drive.rated_torque_nm, node)
+            passed[own] += bank.passed((hat * weights)[own], (hat * past)[own])
+    return passed.reshape(*shape, -1)
+
+
 class _Bank:
     """Play operators of all grid thresholds along one path, for three past states.
 
@@ -81,24 +100,34 @@ class _Bank:
     starts at the upper end of its band (first half) or at the lower end, kept for the samples that remember it.
     """
 
-    def __init__(self, path: TorquePath, rated_torque_nm: float):
+    def __init__(self, path: TorquePath, rated_torque_nm: float, shift_nm: float):
         constant = np.repeat(CONSTANT_SHARES * rated_torque_nm, LOAD_RATIOS.size)[:, None]
         ratio = np.tile(LOAD_RATIOS, CONSTANT_SHARES.size)[:, None]
 
         def lower(torque):
             return torque - constant - ratio * np.abs(torque)
 
-        self.neutral = play(path, lower, np.zeros_like(constant))
-        past = np.concatenate([play(path, lower, np.full_like(constant, end)) - self.neutral for end in (np.inf, -np.inf)])
+        self.neutral = play(path, lower, np.zeros_like(constant), shift_nm)
+        past = np.concatenate(
+            [play(path, lower, np.full_like(constant, end), shift_nm) - self.neutral for end in (np.inf, -np.inf)]
+        )
         remembered = np.flatnonzero(np.any(past != 0, axis=0))
         self.past = past[:, : int(remembered[-1]) + 1 if remembered.size else 0].copy()
 
 
-_banks: weakref.WeakKeyDictionary[TorquePath, dict[float, _Bank]] = weakref.WeakKeyDictionary()
+    def passed(self, weights, past):
+        """Transmitted torque for ``weights`` (…, elements) and those of the two past states, ``past`` (…, 2 · elements)."""
+        passed = np.matmul(weights, self.neutral)
+        passed[..., : self.past.shape[-1]] += np.matmul(past, self.past)
+        return passed
 
 
-def _bank(path: TorquePath, rated_torque_nm: float) -> _Bank:
+_banks: weakref.WeakKeyDictionary[TorquePath, dict[tuple[float, int], _Bank]] = weakref.WeakKeyDictionary()
+
+
+def _bank(path: TorquePath, rated_torque_nm: float, shift_node: int) -> _Bank:
     banks = _banks.setdefault(path, {})
-    if rated_torque_nm not in banks:
-        banks[rated_torque_nm] = _Bank(path, rated_torque_nm)
-    return banks[rated_torque_nm]
+    key = (rated_torque_nm, shift_node)
+    if key not in banks:
+        banks[key] = _Bank(path, rated_torque_nm, shift_node * SHIFT_STEP * rated_torque_nm)
+    return banks[key]

@@ -22,6 +22,7 @@ class Geometric:
 
     name = "geometric"
     stage = Stage.COMPLIANCE
+    signature = "a step of the angle where the torque overcomes the drag, once a direction"
     source = "eq. (19)-(20), reconstructed; doi:10.1177/00202940261442382"
     parameters = (
         Parameter("clearance", "rad", "angle", LogNormal(0.3, 1.5), 0.0, CATALOGUE),
@@ -43,8 +44,8 @@ class Geometric:
             engaged += share * (np.tanh((torque + release) / width) - engaged)
             return engaged
 
-        start = np.array([drive.path.start_torque_nm])
+        start = np.array([drive.path.start_torque_nm]) - drive.shift_nm
         low, high = rising(start), -rising(-start)
-        gap = play(drive.path, rising, low + 0.5 * (1 + values["initial_gap_position"]) * (high - low))
+        gap = play(drive.path, rising, low + 0.5 * (1 + values["initial_gap_position"]) * (high - low), drive.shift_nm)
         gap *= 0.5 * values["clearance"]
         return gap

@@ -13,34 +13,55 @@ from backdrive_bayes.model.path import TorquePath
 
 
 class Stage(enum.IntEnum):
-    """The fixed order in which members act, from the applied torque to the angle that is read."""
+    """The fixed order in which members act, from the torque that is read to the angle that is read."""
 
-    TRANSMISSION = 1
-    """Turns applied torque into the torque that reaches the elastic parts [N·m]."""
-    COMPLIANCE = 2
+    TORQUE_CHANNEL = 1
+    """Error of the torque reading [N·m], the same at all samples, shape (…, 1): the reducer feels the reading less this."""
+    TRANSMISSION = 2
+    """Turns the torque on the reducer into the torque that reaches the elastic parts [N·m]."""
+    COMPLIANCE = 3
     """Adds output angle [rad]."""
+    ANGLE_CHANNEL = 4
+    """Adds to the angle that is read [rad] what is no motion of the reducer."""
+
+    @property
+    def channel(self) -> bool:
+        """Whether the member is a fault of the bench's sensors and no part of the reducer."""
+        return self in (Stage.TORQUE_CHANNEL, Stage.ANGLE_CHANNEL)
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What a member sees: the path, T_r, and the torque that reaches the elastic parts, shape (…, samples)."""
+    """What a member sees.
+
+    The path that is read and T_r; ``transmitted_nm`` (…, samples), the torque that reaches the elastic parts; ``shift_nm`` (scalar
+    or (…, 1)), the error of the torque reading; ``angle_rad`` (…, samples), the angle before the angle channel.
+    """
 
     path: TorquePath
     rated_torque_nm: float
-    transmitted_nm: np.ndarray
+    transmitted_nm: np.ndarray | None = None
+    shift_nm: float | np.ndarray = 0.0
+    angle_rad: np.ndarray | None = None
+
+    @property
+    def torque_nm(self) -> np.ndarray:
+        """Torque on the reducer [N·m], shape (…, samples)."""
+        return self.path.torque_nm - self.shift_nm
 
 
 class Member(Protocol):
     """A module of the reducer or a candidate effect.
 
-    ``respond(values, drive)`` takes a mapping from parameter names to arrays of shape (…, 1) and returns shape
-    (…, samples): torque [N·m] for a member of the transmission stage, angle [rad] for one of the compliance stage.
+    ``respond(values, drive)`` takes a mapping from parameter names to arrays of shape (…, 1) and returns what its stage says,
+    shape (…, samples) unless said otherwise. ``signature`` is what the member is known by, one phrase.
     """
 
     name: str
     stage: Stage
     parameters: tuple[Parameter, ...]
     source: str
+    signature: str
 
     def respond(self, values: dict[str, np.ndarray], drive: Drive) -> np.ndarray:
         """Contribution along the path."""

@@ -6,7 +6,7 @@ prior is N(0, I), whatever the physical units are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -76,6 +76,48 @@ class BoundedLogNormal:
 
 
 @dataclass(frozen=True)
+class LogUniform:
+    """Positive quantity whose logarithm is spread evenly between two bounds."""
+
+    lo: float
+    hi: float
+
+    def from_normal(self, z):
+        """Physical value of the standard-normal coordinate ``z`` (any shape)."""
+        return self.lo * (self.hi / self.lo) ** ndtr(z)
+
+    def to_normal(self, value):
+        """Standard-normal coordinate of a physical value (any shape); clipped just inside the bounds."""
+        return Uniform(0.0, 1.0).to_normal(np.log(np.asarray(value) / self.lo) / np.log(self.hi / self.lo))
+
+    def describe(self) -> str:
+        """One phrase for reports."""
+        return f"log-uniform on [{self.lo:.4g}, {self.hi:.4g}]"
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Quantity of either sign around zero."""
+
+    sd: float
+
+    def from_normal(self, z):
+        """Physical value of the standard-normal coordinate ``z`` (any shape)."""
+        return self.sd * np.asarray(z)
+
+    def to_normal(self, value):
+        """Standard-normal coordinate of a physical value (any shape)."""
+        return np.asarray(value) / self.sd
+
+    def describe(self) -> str:
+        """One phrase for reports."""
+        return f"normal, mean 0, sd {self.sd:.4g}"
+
+
+Prior = LogNormal | BoundedLogNormal | Uniform | LogUniform | Normal
+
+
+@dataclass(frozen=True)
 class Scale:
     """The two scales that a unit's priors are stated in: rated torque [N·m] and an angle scale [rad]."""
 
@@ -95,12 +137,12 @@ class Parameter:
     name: str
     unit: str
     dimension: str
-    prior: LogNormal | BoundedLogNormal | Uniform
+    prior: Prior
     null: float | None
     source: str
     per_record: bool = False
 
-    def scaled_prior(self, scale: Scale) -> LogNormal | BoundedLogNormal | Uniform:
+    def scaled_prior(self, scale: Scale) -> Prior:
         """The prior in SI units for a reducer of the given scale."""
         factor = {
             "torque": scale.torque_nm,
@@ -108,8 +150,5 @@ class Parameter:
             "compliance": scale.angle_rad / scale.torque_nm,
             "none": 1.0,
         }[self.dimension]
-        if isinstance(self.prior, LogNormal):
-            return LogNormal(self.prior.median * factor, self.prior.sigma)
-        if isinstance(self.prior, BoundedLogNormal):
-            return BoundedLogNormal(self.prior.median * factor, self.prior.sigma, self.prior.hi * factor)
-        return Uniform(self.prior.lo * factor, self.prior.hi * factor)
+        # Every number of a prior but the log-sd carries the quantity's dimension.
+        return replace(self.prior, **{k: v * factor for k, v in vars(self.prior).items() if k != "sigma"})

@@ -36,6 +36,17 @@ class TorquePath:
         """Direction of the torque at each sample, ±1.0, shape (samples,)."""
         return np.concatenate([np.full(leg.stop - leg.start, float(leg.direction)) for leg in self.legs])
 
+    @functools.cached_property
+    def rate_nm_per_s(self) -> np.ndarray:
+        """Mean loading rate |dτ/dt| of the leg at each sample [N·m/s], shape (samples,)."""
+        rates, last = [], self.start_torque_nm
+        for leg in self.legs:
+            time, torque = self.time_s[leg.start : leg.stop], self.torque_nm[leg.start : leg.stop]
+            took, way = (np.ptp(time), np.ptp(torque)) if np.ptp(torque) > 0 else (1.0, abs(leg.end_torque_nm - last))
+            rates.append(np.full(time.size, way / took if took > 0 else 0.0))
+            last = leg.end_torque_nm
+        return np.concatenate(rates)
+
     @classmethod
     def from_samples(cls, torque_nm, time_s=None) -> TorquePath:
         """A path through noise-free torque samples of shape (samples,), turning at their local extremes."""

@@ -12,19 +12,20 @@ import numpy as np
 from backdrive_bayes.model.path import TorquePath
 
 
-def play(path: TorquePath, lower, state):
+def play(path: TorquePath, lower, state, shift_nm=0.0):
     """State of a generalised play operator along ``path``, shape (…, samples).
 
     ``lower`` maps torque [N·m] of shape (samples,) to the rising boundary of shape (…, samples), never above the falling
     one, -lower(-torque). ``state`` (…, 1) is where the operator is before the path begins; it is moved between the
-    boundaries at the first torque.
+    boundaries at the first torque. The operator feels the path's torque less ``shift_nm`` (scalar or (…, 1)).
     """
     direction = path.direction
-    bound = lower(direction * path.torque_nm)
+    bound = lower(direction * (path.torque_nm - shift_nm))
     bound *= direction
     signs = np.array([leg.direction for leg in path.legs], float)
-    ends = lower(signs * np.array([leg.end_torque_nm for leg in path.legs])) * signs
-    start = lower(np.array([path.start_torque_nm, -path.start_torque_nm]))
+    ends = lower(signs * (np.array([leg.end_torque_nm for leg in path.legs]) - shift_nm)) * signs
+    first = path.start_torque_nm - shift_nm
+    start = lower(first * np.array([1.0, -1.0]))
     state = np.clip(state, start[..., :1], -start[..., 1:])
     for k, leg in enumerate(path.legs):
         hold = np.maximum if leg.direction > 0 else np.minimum

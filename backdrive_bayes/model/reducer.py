@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,39 +28,70 @@ class ReducerModel:
         """All parameters, shared ones and those of each record, in the members' order."""
         return tuple(p for m in self.members for p in m.parameters)
 
+    @property
+    def reducer(self) -> ReducerModel:
+        """The same model without the faults of the bench's channels."""
+        return replace(self, members=tuple(m for m in self.members if not m.stage.channel))
+
     def transmitted_nm(self, values, path: TorquePath) -> np.ndarray:
         """Torque that reaches the elastic parts [N·m], shape (…, samples)."""
-        torque = path.torque_nm
-        for member in self._at(Stage.TRANSMISSION):
-            torque = member.respond(values, Drive(path, self.scale.torque_nm, torque))
-        return torque
+        return self._transmit(values, self._at_the_output(values, path)).transmitted_nm
 
     def parts(self, values, path: TorquePath) -> dict[str, np.ndarray]:
-        """Angle [rad] of each module, shape (…, samples) each; they add up to :meth:`angle`.
+        """Angle [rad] of each member, shape (…, samples) each; they add up to :meth:`angle`.
 
-        What friction does is the change of the elastic angle when the friction acts.
+        What a member of the transmission does is the change of the elastic angle when it acts, and a torque channel's part
+        is the change of the whole angle.
         """
-        free = Drive(path, self.scale.torque_nm, path.torque_nm)
-        drive = Drive(path, self.scale.torque_nm, self.transmitted_nm(values, path))
-        parts = {}
-        held = 0.0
-        for member in self._at(Stage.COMPLIANCE):
-            parts[member.name] = member.respond(values, free)
-            held = held + member.respond(values, drive) - parts[member.name]
+        drive, whole, parts = Drive(path, self.scale.torque_nm, path.torque_nm), self, {}
+        for member in self._at(Stage.TORQUE_CHANNEL):
+            others = replace(whole, members=tuple(m for m in whole.members if m is not member))
+            parts[member.name] = whole.angle(values, path) - others.angle(values, path)
+            whole = others
+        parts |= {m.name: m.respond(values, drive) + np.zeros(path.torque_nm.shape) for m in self._at(Stage.COMPLIANCE)}
+        before = sum(parts[m.name] for m in self._at(Stage.COMPLIANCE))
         for member in self._at(Stage.TRANSMISSION):
-            parts[member.name] = held + np.zeros(path.torque_nm.shape)
-        return parts
+            drive = replace(drive, transmitted_nm=member.respond(values, drive))
+            after = self._comply(values, drive)
+            parts[member.name] = after - before
+            before = after
+        return parts | self._read(values, replace(drive, angle_rad=before))[1]
 
     def angle(self, values, path: TorquePath) -> np.ndarray:
         """Output angle [rad] without the encoder's offset, shape (…, samples).
 
         ``values`` maps every parameter's name to an array of shape (…, 1) in SI units.
         """
-        drive = Drive(path, self.scale.torque_nm, self.transmitted_nm(values, path))
-        angle = np.zeros(path.torque_nm.shape)
+        drive = self._transmit(values, self._at_the_output(values, path))
+        angle = self._comply(values, drive)
+        if not self._at(Stage.ANGLE_CHANNEL):
+            return angle
+        return self._read(values, replace(drive, angle_rad=angle))[0]
+
+    def _at_the_output(self, values, path):
+        drive = Drive(path, self.scale.torque_nm)
+        for member in self._at(Stage.TORQUE_CHANNEL):
+            drive = replace(drive, shift_nm=drive.shift_nm + member.respond(values, drive))
+        return replace(drive, transmitted_nm=drive.torque_nm)
+
+    def _transmit(self, values, drive):
+        for member in self._at(Stage.TRANSMISSION):
+            drive = replace(drive, transmitted_nm=member.respond(values, drive))
+        return drive
+
+    def _comply(self, values, drive):
+        angle = np.zeros(drive.path.torque_nm.shape)
         for member in self._at(Stage.COMPLIANCE):
             angle = angle + member.respond(values, drive)
         return angle
+
+    def _read(self, values, drive):
+        """The angle that is read, and what each member of the angle channel adds to it."""
+        parts = {}
+        for member in self._at(Stage.ANGLE_CHANNEL):
+            parts[member.name] = member.respond(values, drive)
+            drive = replace(drive, angle_rad=drive.angle_rad + parts[member.name])
+        return drive.angle_rad, parts
 
     def _at(self, stage: Stage):
         return [m for m in self.members if m.stage is stage]

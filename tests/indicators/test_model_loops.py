@@ -22,6 +22,9 @@ class Prior:
         rows = z[:, 0].astype(int)
         return {k: v[rows] for k, v in self.all.items()}
 
+    def loading_rate_nm_per_s(self, record):
+        return 1.0
+
 
 Z = np.arange(DRAWS, dtype=float)[:, None]
 

@@ -1,0 +1,39 @@
+"""Second backlash: the clearance of another stage, crossed at a torque of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.model.member import Stage
+from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter, Uniform
+from backdrive_bayes.model.play import play
+
+STAGE = "weakly informative: a stage with more preload than the first"
+
+
+class SecondBacklash:
+    """Play between the boundaries ±(c₂/2) tanh((τ ∓ τ_d2)/s₂): a second, narrow step once a direction."""
+
+    name = "second_backlash"
+    stage = Stage.COMPLIANCE
+    signature = "a second step of the angle in each direction, at another torque than the first"
+    source = "stages of a multi-stage planetary train in series"
+    parameters = (
+        Parameter("second_clearance", "rad", "angle", LogNormal(0.03, 1.2), 0.0, STAGE),
+        Parameter("second_drag_torque", "N·m", "torque", LogUniform(0.05, 0.8), None, "within the rated range"),
+        # A wide step is friction.
+        Parameter("second_engagement_torque", "N·m", "torque", LogUniform(0.003, 0.08), None, "a narrow step"),
+        Parameter("initial_second_gap_position", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
+    )
+
+    def respond(self, values, drive):
+        """Angle [rad], shape (…, samples)."""
+        drag, width = values["second_drag_torque"], values["second_engagement_torque"]
+
+        def rising(torque):
+            return np.tanh((torque - drag) / width)
+
+        start = np.array([drive.path.start_torque_nm]) - drive.shift_nm
+        low, high = rising(start), -rising(-start)
+        state = low + 0.5 * (1 + values["initial_second_gap_position"]) * (high - low)
+        return 0.5 * values["second_clearance"] * play(drive.path, rising, state, drive.shift_nm)

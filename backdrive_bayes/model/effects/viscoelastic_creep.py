@@ -1,0 +1,38 @@
+"""Viscoelastic creep: delayed compliance of polymer gears."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.model.member import Stage
+from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter, Uniform
+from backdrive_bayes.model.relaxation import relax
+
+SLOWER = 6.0
+"""Ratio of the two relaxation times."""
+POLYMER = "weakly informative: delayed compliance of some per cent of the elastic one, seconds to minutes"
+
+
+class ViscoelasticCreep:
+    """Two Kelvin-Voigt elements in series, relaxing with T and 6T towards the load's part above a creep threshold."""
+
+    name = "viscoelastic_creep"
+    stage = Stage.COMPLIANCE
+    signature = "the angle lags the load by seconds: more of it at slower rates, relaxing after each change"
+    source = "Kelvin-Voigt chain; threshold creep for the rate behaviour told in doi:10.1177/00202940261442382"
+    parameters = (
+        Parameter("creep_compliance", "rad/(N·m)", "compliance", LogNormal(0.04, 1.2), 0.0, POLYMER),
+        # Faster creep would be lag of the sensor, slower creep compliance.
+        Parameter("creep_time", "s", "none", LogUniform(0.3, 30.0), None, POLYMER),
+        Parameter("creep_slow_share", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
+        Parameter("creep_threshold", "N·m", "torque", Uniform(0.0, 0.7), None, "no preference"),
+    )
+
+    def respond(self, values, drive):
+        """Angle [rad], shape (…, samples)."""
+        load = drive.transmitted_nm
+        load = load - np.clip(load, -values["creep_threshold"], values["creep_threshold"])
+        time, constant, slow = drive.path.time_s, values["creep_time"], values["creep_slow_share"]
+        start = load[..., :1]
+        fast = relax(load, time, constant, start)
+        return values["creep_compliance"] * (fast + slow * (relax(load, time, SLOWER * constant, start) - fast))
