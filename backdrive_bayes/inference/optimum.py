@@ -33,13 +33,6 @@ def find_optimum(problem: Problem, starts, max_steps: int = 80) -> Optimum:
     return laplace(problem, best[0])
 
 
-def screen_starts(problem: Problem, rng, candidates: int = 1024, keep: int = 8) -> np.ndarray:
-    """The most promising of many prior draws, shape (keep, dimension)."""
-    z = rng.normal(size=(candidates, problem.dimension))
-    order = np.argsort(-problem.log_posterior(z))
-    return z[order[:keep]]
-
-
 def laplace(problem: Problem, z) -> Optimum:
     """Gaussian approximation of the posterior at ``z``."""
     residual, jacobian, scale2 = _linearise(problem, z)

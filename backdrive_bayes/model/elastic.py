@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.model.member import Stage
-from backdrive_bayes.model.parameter import LogNormal, Parameter
+from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter
 
 STEEL_TO_PLASTIC = "weakly informative: the peak angle over the rated torque, a factor of 2.7 either way"
 
@@ -24,7 +24,8 @@ class Elastic:
     parameters = (
         Parameter("compliance", "rad/(N·m)", "compliance", LogNormal(0.6, 1.0), 0.0, STEEL_TO_PLASTIC),
         Parameter("hardening_ratio", "1", "none", LogNormal(1.0, 0.7), 1.0, "no preference for hardening or softening"),
-        Parameter("hardening_torque", "N·m", "torque", LogNormal(0.4, 0.7), None, "bends within the rated range"),
+        # A sharper bend would be a clearance without friction.
+        Parameter("hardening_torque", "N·m", "torque", LogUniform(0.1, 3.0), None, "bends within the rated range"),
     )
 
     def respond(self, values, drive):

@@ -6,7 +6,7 @@ import numpy as np
 
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogNormal, Parameter, Uniform
-from backdrive_bayes.model.play import play
+from backdrive_bayes.model.play import play_from
 
 CATALOGUE = "weakly informative; clearance, drag and engagement of small planetary stages in catalogues"
 
@@ -17,7 +17,8 @@ class Geometric:
     The rising boundary is (c/2)[(1-e) tanh((τ-τ_d)/s) + e tanh((τ+τ_e)/s)], the falling one its mirror image. With e = 0 and
     a saturated loop these are the branches A tanh(Bτ ∓ D) of eq. (20), reconstructed, with A = c/2, B = 1/s,
     D = τ_d/s. The share e of the clearance springs back already when the torque has fallen to τ_e. The initial position runs from
-    -1 to 1 between the boundaries at the first torque.
+    -1 to 1 between the boundaries at the first torque; teeth that share the clearance may have been left at different places: the
+    share ``initial_gap_spread`` of them lies at the one flank or the other so as to give the same mean position.
     """
 
     name = "geometric"
@@ -31,6 +32,7 @@ class Geometric:
         Parameter("release_share", "1", "none", Uniform(0.0, 0.5), None, "no preference"),
         Parameter("release_torque", "N·m", "torque", LogNormal(0.02, 1.0), None, CATALOGUE),
         Parameter("initial_gap_position", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
+        Parameter("initial_gap_spread", "1", "none", Uniform(0.0, 1.0), None, "the unit's past is unknown", True),
     )
 
     def respond(self, values, drive):
@@ -46,6 +48,9 @@ class Geometric:
 
         start = np.array([drive.path.start_torque_nm]) - drive.shift_nm
         low, high = rising(start), -rising(-start)
-        gap = play(drive.path, rising, low + 0.5 * (1 + values["initial_gap_position"]) * (high - low), drive.shift_nm)
+        place, spread = 0.5 * (1 + values["initial_gap_position"]), values["initial_gap_spread"]
+        gap, below, above = play_from(drive.path, rising, [low + place * (high - low), low, high], drive.shift_nm)
+        below += place * (above - below)
+        gap += spread * (below - gap)
         gap *= 0.5 * values["clearance"]
         return gap

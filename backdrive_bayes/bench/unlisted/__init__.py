@@ -1,0 +1,1 @@
+"""Effects that a diagnosis does not know: their true answer is `unknown`."""

@@ -1,0 +1,97 @@
+"""`simulate`: virtual bench records of a reducer with any effects."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from backdrive_bayes.commands.output import say, write_folder, write_json
+from backdrive_bayes.errors import BadInput
+
+HELP = "make the records of a virtual bench: a reducer with any effects, as a unit folder"
+MOST_SAMPLES = 5_000_000
+
+
+def add_arguments(parser) -> None:
+    """Options of this verb."""
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="NAME[=SEVERITY]", help="effect and severity (default 1), repeatable"
+    )
+    parser.add_argument("--rates", default="0.1,0.5,1", metavar="R,…", help="loading rates in rated torques per second")
+    parser.add_argument("--amplitudes", default="1", metavar="A,…", help="amplitudes as shares of the rated torque")
+    parser.add_argument("--cycles", default="1", metavar="N", help="cycles of each record (default 1)")
+    parser.add_argument("--hertz", default="1000", metavar="F", help="sampling frequency (default 1000)")
+    parser.add_argument("--kind", help="geometric, elastic or intermediate (default: at random)")
+    parser.add_argument("--dirt", default="1", metavar="LEVEL", help="small faults of every bench (default 1, 0 is none)")
+    parser.add_argument("--truth", type=Path, metavar="FILE", help="also write the truth, to this file outside OUT")
+
+
+def run(args) -> int:
+    """Write a unit folder, and the truth where asked."""
+    import numpy as np
+
+    from backdrive_bayes.bench.reducer import KINDS
+    from backdrive_bayes.bench.unit import draw_unit
+    from backdrive_bayes.bench.writing import truth_json, write_unit
+
+    plan, out = _plan(args), args.out or Path("bench-unit")
+    if args.kind is not None and args.kind not in KINDS:
+        raise BadInput("--kind", f"one of {', '.join(KINDS)}", f"'{args.kind}'")
+    _refuse_inside(args.truth, out)
+    dirt = _numbers("--dirt", args.dirt, 0.0, 10.0, one=True)[0]
+    rng = np.random.default_rng(args.seed)
+    bench = draw_unit(rng, _effects(args.effect), plan=plan, kind=args.kind, dirt=dirt, name=f"bench-unit-{args.seed}")
+    with write_folder(out) as folder:
+        write_unit(bench, folder)
+    if args.truth:
+        args.truth.parent.mkdir(parents=True, exist_ok=True)
+        write_json(args.truth, truth_json(bench))
+    say(f"written to {out}: {len(plan.loops)} records, rated torque {bench.unit.rated_torque_nm:.4g} N·m")
+    return 0
+
+
+def _plan(args):
+    from backdrive_bayes.bench.plan import make_plan
+
+    rates = _numbers("--rates", args.rates, 1e-4, 100.0)
+    amplitudes = _numbers("--amplitudes", args.amplitudes, 0.01, 3.0)
+    cycles = _numbers("--cycles", args.cycles, 1, 1000, one=True)[0]
+    hertz = _numbers("--hertz", args.hertz, 10.0, 10000.0, one=True)[0]
+    if cycles != int(cycles):
+        raise BadInput("--cycles", "a whole number", args.cycles)
+    plan = make_plan(rates, amplitudes, int(cycles), hertz)
+    samples = [(4 * cycles + 1) * loop.amplitude / loop.rate * hertz for loop in plan.loops]
+    if sum(samples) > MOST_SAMPLES or min(samples) < 200:
+        asked = f"{min(samples):.0f} in the shortest, {sum(samples):.0f} in all"
+        raise BadInput("samples of the records", f"200 in each and at most {MOST_SAMPLES} in all", asked)
+    return plan
+
+
+def _effects(words) -> dict[str, float]:
+    effects = {}
+    for word in words:
+        name, given, severity = word.partition("=")
+        if name in effects:
+            raise BadInput("--effect", "each effect once", f"'{name}' twice")
+        effects[name] = _numbers(f"--effect {name}", severity, 0.0, 10.0, one=True)[0] if given else 1.0
+    return effects
+
+
+def _numbers(option, text, low, high, one=False) -> tuple[float, ...]:
+    wanted = f"{'a number' if one else 'numbers'} from {low:g} to {high:g}"
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise BadInput(option, wanted, f"'{text}'") from None
+    if not all(math.isfinite(v) and low <= v <= high for v in values) or (one and len(values) > 1):
+        raise BadInput(option, wanted, f"'{text}'")
+    return values
+
+
+def _refuse_inside(truth: Path | None, out: Path) -> None:
+    if truth is None:
+        return
+    if truth.is_dir():
+        raise BadInput("--truth", "a file to write", f"the folder '{truth}'")
+    if truth.resolve().is_relative_to(out.resolve()):
+        raise BadInput("--truth", f"a file outside {out}", f"'{truth}'")

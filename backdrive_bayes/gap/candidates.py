@@ -1,0 +1,107 @@
+"""All hypotheses of one unit: the baseline, every effect, and the pairs that earn it, fitted and weighed.
+
+Pairs are searched exhaustively in a linear approximation (what both effects together could take out of the residual); the best
+of them are then fitted in full.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from backdrive_bayes.gap.evidence import log_evidence
+from backdrive_bayes.gap.hypotheses import Fitted, Flexible, fit_none, fit_screened, screen
+from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
+from backdrive_bayes.model.registry import candidates_beside
+
+REFERENCE = ("loop", MISFIT_LENGTH, 0.5)
+"""Misfit under which modes are searched."""
+MISFIT_LEVELS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+"""Standard deviations of the misfit along the loop, in those of the noise, under which hypotheses are weighed."""
+UNKNOWN_KINDS = (("own_loop", 0.06), ("time_smooth", 0.1), ("time_rough", 0.1))
+UNKNOWN_LEVELS = (1.0, 3.0, 10.0, 30.0, 100.0)
+PAIRS_FITTED = 4
+WORTHWHILE = 4.0
+"""Log-likelihood by which a pair must beat its better half in the linear search to be fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A fitted hypothesis with its log evidence under each misfit level, shape (levels,)."""
+
+    fitted: Fitted
+    log_evidence: np.ndarray
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return self.fitted.effects
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Every hypothesis weighed, and the log evidence (kinds, levels) of unexplained structure beyond the baseline's misfit."""
+
+    weighed: tuple[Weighed, ...]
+    unexplained: np.ndarray
+
+    @property
+    def none(self) -> Weighed:
+        """The baseline alone."""
+        return self.weighed[0]
+
+
+def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Candidates:
+    """Fit and weigh the baseline, single effects and pairs; ``allowed`` names the effects of the library (default: all)."""
+    reference = setting.whitening(REFERENCE)
+    none = fit_none(setting, reference)
+    names = [n for n in candidates_beside(setting.problem.model.names) if allowed is None or n in allowed]
+    screens, singles = {}, {}
+    for name in names:
+        note(f"effect {name}")
+        screens[name] = screen(setting, none, name, reference, rng)
+        singles[name] = fit_screened(screens[name], (name,))
+    weighed = [_weigh(setting, f) for f in (none, *singles.values())]
+    for pair in _promising_pairs(none, singles, screens, reference):
+        note(f"effects {' + '.join(pair)}")
+        known, other = sorted(pair, key=lambda n: -max(_weigh(setting, singles[n]).log_evidence))
+        found = screen(setting, singles[known], other, reference, rng, 128)
+        weighed.append(_weigh(setting, fit_screened(found, pair)))
+    small = ("loop", MISFIT_LENGTH, 0.3)
+    unexplained = np.array([
+        [log_evidence(setting, none, small, (kind, length, level)) for level in UNKNOWN_LEVELS] for kind, length in UNKNOWN_KINDS
+    ])
+    return Candidates(tuple(weighed), unexplained)
+
+
+def _weigh(setting, fitted):
+    return Weighed(fitted, np.array([log_evidence(setting, fitted, ("loop", MISFIT_LENGTH, level)) for level in MISFIT_LEVELS]))
+
+
+def _promising_pairs(none, singles, screens, whitening):
+    """The pairs that together could take the most out of the baseline's residual, in linear approximation."""
+    flexible = Flexible.of(none, whitening)
+    total = flexible.residual @ flexible.residual
+    columns = {}
+    for name, fitted in singles.items():
+        change = whitening.matrix @ (none.residual - fitted.residual)
+        columns[name] = np.concatenate([flexible.left(change)[None], screens[name].change])
+    alone = {name: total - _left(flexible.residual, c) for name, c in columns.items()}
+    gains = {
+        pair: total - _left(flexible.residual, np.concatenate([columns[n] for n in pair])) - max(alone[n] for n in pair)
+        for pair in itertools.combinations(singles, 2)
+    }
+    # Each further column fits noise worth one unit of chi-square.
+    reach = {pair: 0.5 * (gain - len(columns[pair[0]])) for pair, gain in gains.items()}
+    combined = {pair: 0.5 * gains[pair] + 0.5 * max(alone[n] for n in pair) for pair in gains}
+    good = [pair for pair in sorted(combined, key=lambda p: -combined[p]) if reach[pair] > WORTHWHILE]
+    return good[:PAIRS_FITTED]
+
+
+def _left(residual, columns):
+    """Chi-square left by a ridge fit of unit prior deviations around the fitted amplitudes' size."""
+    gram = columns @ columns.T
+    load = columns @ residual
+    return residual @ residual - load @ np.linalg.solve(gram + np.eye(len(load)), load)

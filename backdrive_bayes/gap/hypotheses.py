@@ -1,0 +1,145 @@
+"""Hypotheses and their fits: the baseline with one or two effects, all parameters fitted jointly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backdrive_bayes.gap.setting import JointProblem, Setting, Whitening
+from backdrive_bayes.inference.optimum import find_optimum
+from backdrive_bayes.model.reducer import ReducerModel
+from backdrive_bayes.model.registry import members_named
+
+SCREENED = 256
+STARTS = 3
+PROBE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A hypothesis at its mode: ``residual`` (blocks,) and ``jacobian`` (blocks, dimension) in rad, not whitened.
+
+    ``contributions`` (blocks,) in rad, one an effect: how the angle changes when that effect alone is taken out.
+    """
+
+    effects: tuple[str, ...]
+    problem: JointProblem
+    z: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    contributions: tuple[np.ndarray, ...]
+
+
+def joint_problem(setting: Setting, effects, whitening: Whitening) -> JointProblem:
+    """The unit's problem with ``effects`` added to the baseline."""
+    base = setting.problem
+    model = ReducerModel(members_named([*base.model.names, *effects]), base.model.scale)
+    return JointProblem(model, base.records, 0.0, whitener=whitening.matrix)
+
+
+def fit_from(problem: JointProblem, effects, starts, max_steps: int = 30) -> Fitted:
+    """The best mode reached from ``starts`` (starts, dimension)."""
+    z = find_optimum(problem, starts, max_steps).z
+    return linearised(problem, effects, z)
+
+
+def linearised(problem: JointProblem, effects, z) -> Fitted:
+    """Residual and Jacobian of the residual at ``z``."""
+    n = z.size
+    probes = np.concatenate([z[None], z + PROBE * np.eye(n), z - PROBE * np.eye(n)])
+    raw = problem.raw_residual(probes)
+    contributions = tuple(contribution(problem, z, name) for name in effects)
+    return Fitted(tuple(effects), problem, z, raw[0], (raw[1 : n + 1] - raw[n + 1 :]).T / (2 * PROBE), contributions)
+
+
+def contribution(problem: JointProblem, z, effect: str) -> np.ndarray:
+    """Angle [rad] of all blocks with the effect less that without it, each record's mean taken out, shape (blocks,)."""
+    model, parts = problem.model, []
+    without = replace(model, members=tuple(m for m in model.members if m.name != effect))
+    for r, data in enumerate(problem.records):
+        values = problem.values(z, r)
+        change = model.angle(values, data.path) - without.angle(values, data.path)
+        parts.append(change - change.mean())
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """What an effect could do about the residual of a fitted hypothesis: the most promising of many prior draws.
+
+    ``starts`` (starts, dimension) for ``problem``; ``change`` (starts, blocks), the whitened change of the angle at the amplitude
+    that least squares asks for, with what the known parameters can do taken out.
+    """
+
+    problem: JointProblem
+    starts: np.ndarray
+    change: np.ndarray
+
+
+def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, rng, draws: int = SCREENED) -> Screen:
+    """Draw the effect's own parameters from their prior and find the amplitude of each draw by least squares."""
+    problem = joint_problem(setting, (*known.effects, effect), whitening)
+    own = np.array([label not in known.problem.labels for label in problem.labels])
+    order = [known.problem.labels.index(label) for label in np.array(problem.labels)[~own]]
+    z = np.empty((draws, problem.dimension))
+    z[:, ~own] = known.z[order]
+    z[:, own] = rng.standard_normal((draws, own.sum()))
+    flexible = Flexible.of(known, whitening)
+    change = flexible.left((known.residual - problem.raw_residual(z)) @ whitening.matrix.T)
+    size = np.einsum("ij,ij->i", change, change) + 1.0
+    amount = change @ flexible.residual / size
+    gain = amount**2 * size * ((amount > 0) | _signed(problem, own))
+    best = np.argsort(-gain)[:STARTS]
+    starts = z[best]
+    _scale_amplitude(problem, own, starts, amount[best])
+    return Screen(problem, starts, amount[best][:, None] * change[best])
+
+
+@dataclass(frozen=True, eq=False)
+class Flexible:
+    """A fitted hypothesis whose parameters give way: whitened ``residual`` (blocks,), and what takes its directions out."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    solve: np.ndarray
+
+    @classmethod
+    def of(cls, fitted: Fitted, whitening: Whitening) -> Flexible:
+        """Linear in the parameters around the mode."""
+        jacobian = whitening.matrix @ fitted.jacobian
+        solve = np.linalg.solve(np.eye(fitted.z.size) + jacobian.T @ jacobian, jacobian.T)
+        residual = whitening.matrix @ fitted.residual - jacobian @ fitted.z
+        return cls(residual - jacobian @ (solve @ residual), jacobian, solve)
+
+    def left(self, change):
+        """What of whitened changes (…, blocks) the parameters cannot do."""
+        return change - (change @ self.solve.T) @ self.jacobian.T
+
+
+def _amplitudes(problem, own):
+    return [i for i in np.flatnonzero(own) if problem.coordinates[i].parameter.null == 0.0]
+
+
+def _signed(problem, own):
+    return all(type(problem.coordinates[i].parameter.prior).__name__ == "Normal" for i in _amplitudes(problem, own))
+
+
+def _scale_amplitude(problem, own, starts, amount):
+    """Multiply the parameters that vanish at the null by ``amount`` (starts,), in place and within four prior deviations."""
+    for i in _amplitudes(problem, own):
+        prior = problem.coordinates[i].parameter.scaled_prior(problem.model.scale)
+        value = prior.from_normal(starts[:, i]) * amount
+        with np.errstate(divide="ignore", invalid="ignore"):
+            z = prior.to_normal(value)
+        starts[:, i] = np.clip(np.nan_to_num(z, nan=0.0, posinf=3, neginf=-3), -3, 3)
+
+
+def fit_none(setting: Setting, whitening: Whitening) -> Fitted:
+    """The baseline alone, from the mode found when the unit was prepared."""
+    return fit_from(joint_problem(setting, (), whitening), (), [setting.z])
+
+
+def fit_screened(found: Screen, effects, max_steps: int = 30) -> Fitted:
+    """The best mode from the starts of a screen."""
+    return fit_from(found.problem, effects, found.starts, max_steps)

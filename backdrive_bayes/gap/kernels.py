@@ -1,0 +1,66 @@
+"""Covariances of what no model explains: smooth or rough functions of the place on the loop, of time, of the record."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.inference.discrepancy import LoopCoordinate, amplitude_nm
+from backdrive_bayes.inference.problem import Problem
+
+SAME_LOOP = 0.05
+"""Relative difference of amplitudes below which two records run the same loop."""
+FIRST_LEG_SHARED = 0.5
+
+
+class Places:
+    """Where every block lies: phase on the loop, whether on the first leg, record, time; arrays of shape (blocks,)."""
+
+    def __init__(self, problem: Problem, z):
+        data = problem.records
+        coordinates = [LoopCoordinate.of(problem, z, r) for r in range(len(data))]
+        self.phase = np.concatenate([c.phase(d.path.torque_nm, d.path.direction) for c, d in zip(coordinates, data, strict=True)])
+        self.record = np.concatenate([np.full(d.blocks.count.size, r) for r, d in enumerate(data)])
+        self.first = np.concatenate([d.blocks.leg == 0 for d in data])
+        self.time = np.concatenate([(d.blocks.mid_s - d.blocks.begin_s[0]) / (d.blocks.end_s[-1] - d.blocks.begin_s[0]) for d in data])
+        amplitude = np.array([amplitude_nm(problem, r) for r in range(len(data))])
+        self.same_loop = np.abs(np.log(amplitude[:, None] / amplitude)) < SAME_LOOP
+        span = np.array([np.ptp(d.blocks.angle_rad) for d in data])
+        self.relative = (span / span.max())[self.record]
+
+    def _same_record(self):
+        return self.record[:, None] == self.record
+
+    def _scaled(self, kernel):
+        return kernel * np.outer(self.relative, self.relative)
+
+    def loop(self, length: float) -> np.ndarray:
+        """Rough function of the place on the loop (Matérn-1/2 of ``length`` loops), half of it common to equal loops."""
+        apart = np.abs(self.phase[:, None] - self.phase)
+        apart = np.minimum(apart, 1 - apart)
+        share = np.where(self.first[:, None] == self.first, 1.0, FIRST_LEG_SHARED)
+        common = 0.5 * self.same_loop[np.ix_(self.record, self.record)] + 0.5 * self._same_record()
+        return self._scaled(share * common * np.exp(-apart / length))
+
+    def shape(self, length: float) -> np.ndarray:
+        """Smooth function of the place on the loop (Matérn-3/2), the same in equal loops and by half in others."""
+        apart = np.abs(self.phase[:, None] - self.phase)
+        apart = np.sqrt(3) * np.minimum(apart, 1 - apart) / length
+        common = 0.5 + 0.5 * self.same_loop[np.ix_(self.record, self.record)]
+        share = np.where(self.first[:, None] == self.first, 1.0, FIRST_LEG_SHARED)
+        return common * share * (1 + apart) * np.exp(-apart)
+
+    def own_loop(self, length: float) -> np.ndarray:
+        """The same, each record by itself."""
+        apart = np.abs(self.phase[:, None] - self.phase)
+        apart = np.minimum(apart, 1 - apart)
+        return self._scaled(self._same_record() * np.exp(-apart / length))
+
+    def time_smooth(self, length: float) -> np.ndarray:
+        """Smooth function of the time within each record (Matérn-3/2 of ``length`` records)."""
+        apart = np.sqrt(3) * np.abs(self.time[:, None] - self.time) / length
+        return self._scaled(self._same_record() * (1 + apart) * np.exp(-apart))
+
+    def time_rough(self, length: float) -> np.ndarray:
+        """Rough function of the time within each record (Matérn-1/2), which may jump."""
+        apart = np.abs(self.time[:, None] - self.time) / length
+        return self._scaled(self._same_record() * np.exp(-apart))

@@ -1,0 +1,68 @@
+"""The verb `simulate`: files, determinism, the truth kept apart, and one line for whatever is wrong."""
+
+import json
+
+import pytest
+
+from backdrive_bayes.commands.main import main
+from backdrive_bayes.records.unit_folder import read_unit
+
+QUICK = ["--rates", "1,5", "--hertz", "200"]
+
+
+def run(*words):
+    return main(["simulate", *QUICK, *map(str, words)])
+
+
+def test_a_unit_folder_is_written(tmp_path, capsys):
+    assert run("--effect", "sensor_lag=0.5", "--effect", "thermal_drift", "--seed", "3", "-o", tmp_path / "unit") == 0
+    unit = read_unit(tmp_path / "unit")
+    assert len(unit.records) == 2 and unit.records[1].loading_rate_nm_per_s == pytest.approx(5 * unit.rated_torque_nm, rel=1e-4)
+    assert "2 records" in capsys.readouterr().out
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path):
+    for name, seed in (("a", 5), ("b", 5), ("c", 6)):
+        assert run("--effect", "unknown", "--seed", seed, "-o", tmp_path / name) == 0
+    a, b, c = ([p.read_bytes() for p in sorted((tmp_path / n).glob("*.gz"))] for n in "abc")
+    assert a == b and a != c
+
+
+def test_the_truth_goes_only_where_asked(tmp_path):
+    out, truth = tmp_path / "unit", tmp_path / "keys" / "truth.json"
+    assert run("--effect", "encoder_error", "--seed", "2", "-o", out) == 0
+    assert "encoder" not in (out / "unit.toml").read_text() and len(list(out.iterdir())) == 3
+    assert run("--effect", "encoder_error", "--seed", "2", "-o", out, "--truth", truth) == 0
+    assert json.loads(truth.read_text())["answer"] == ["encoder_error"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--effect", "slip"],
+        ["--effect", "sensor_lag=-1"],
+        ["--effect", "sensor_lag=x"],
+        ["--effect", "sensor_lag="],
+        ["--effect", "sensor_lag", "--effect", "sensor_lag=2"],
+        ["--effect", "none", "--effect", "sensor_lag"],
+        ["--rates", "0"],
+        ["--rates", "1,,2"],
+        ["--rates", "nan"],
+        ["--rates", "0.0001", "--hertz", "10000"],
+        ["--rates", "100", "--hertz", "10"],
+        ["--amplitudes", "-1"],
+        ["--cycles", "1.5"],
+        ["--cycles", "0"],
+        ["--kind", "round"],
+        ["--dirt", "-1"],
+        ["--seed", "-1"],
+        ["--truth", "OUT/truth.json"],
+    ],
+    ids=" ".join,
+)
+def test_bad_input_is_one_line(tmp_path, capsys, words):
+    words = [w.replace("OUT", str(tmp_path / "unit")) for w in words]
+    assert run("-o", tmp_path / "unit", *words) == 2
+    seen = capsys.readouterr()
+    assert seen.err.count("\n") == 1 and not seen.out
+    assert not list(tmp_path.iterdir())
