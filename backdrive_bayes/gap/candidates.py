@@ -12,17 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.gap.evidence import log_evidence
-from backdrive_bayes.gap.hypotheses import Fitted, Flexible, fit_none, fit_screened, screen
+from backdrive_bayes.gap.hypotheses import Fitted, Flexible, fit_none, fit_screened, polished, screen
 from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
 from backdrive_bayes.model.registry import candidates_beside
 
-REFERENCE = ("loop", MISFIT_LENGTH, 0.5)
+REFERENCE = ("misfit", MISFIT_LENGTH, 0.5)
 """Misfit under which modes are searched."""
-MISFIT_LEVELS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+MISFIT_LEVELS = (0.1, 0.3, 1.0, 2.0, 4.0, 10.0)
 """Standard deviations of the misfit along the loop, in those of the noise, under which hypotheses are weighed."""
-UNKNOWN_KINDS = (("own_loop", 0.06), ("time_smooth", 0.1), ("time_rough", 0.1))
-UNKNOWN_LEVELS = (1.0, 3.0, 10.0, 30.0, 100.0)
+UNKNOWN_KINDS = (("loop", 0.02), ("own_loop", 0.06), ("time_smooth", 0.1), ("time_rough", 0.05))
+UNKNOWN_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
 PAIRS_FITTED = 4
+POLISHED = 3
 WORTHWHILE = 4.0
 """Log-likelihood by which a pair must beat its better half in the linear search to be fitted."""
 
@@ -42,10 +43,18 @@ class Weighed:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Every hypothesis weighed, and the log evidence (kinds, levels) of unexplained structure beyond the baseline's misfit."""
+    """Every hypothesis weighed, and the log evidence of unexplained structure, (2, kinds, levels).
+
+    ``unexplained[0]`` is beside the baseline alone, ``unexplained[1]`` beside the best single effect.
+    """
 
     weighed: tuple[Weighed, ...]
     unexplained: np.ndarray
+
+    @property
+    def best(self) -> Weighed:
+        """The hypothesis of the highest evidence under any misfit."""
+        return max(self.weighed, key=lambda w: w.log_evidence.max())
 
     @property
     def none(self) -> Weighed:
@@ -69,15 +78,30 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
         known, other = sorted(pair, key=lambda n: -max(_weigh(setting, singles[n]).log_evidence))
         found = screen(setting, singles[known], other, reference, rng, 128)
         weighed.append(_weigh(setting, fit_screened(found, pair)))
-    small = ("loop", MISFIT_LENGTH, 0.3)
-    unexplained = np.array([
-        [log_evidence(setting, none, small, (kind, length, level)) for level in UNKNOWN_LEVELS] for kind, length in UNKNOWN_KINDS
-    ])
+    weighed = _polish_best(setting, weighed)
+    best = max(weighed[1 : len(names) + 1], key=lambda w: w.log_evidence.max(), default=weighed[0])
+    unexplained = np.array([_unexplained(setting, fitted) for fitted in (none, best.fitted)])
     return Candidates(tuple(weighed), unexplained)
 
 
+def _polish_best(setting, weighed):
+    """The few most probable hypotheses, and the baseline, climbed to the end."""
+    order = sorted(range(len(weighed)), key=lambda i: -weighed[i].log_evidence.max())
+    again = {0, *order[:POLISHED]}
+    return [_better(w, _weigh(setting, polished(w.fitted))) if i in again else w for i, w in enumerate(weighed)]
+
+
+def _better(one, other):
+    return max(one, other, key=lambda w: w.log_evidence.max())
+
+
 def _weigh(setting, fitted):
-    return Weighed(fitted, np.array([log_evidence(setting, fitted, ("loop", MISFIT_LENGTH, level)) for level in MISFIT_LEVELS]))
+    return Weighed(fitted, np.array([log_evidence(setting, fitted, ("misfit", MISFIT_LENGTH, level)) for level in MISFIT_LEVELS]))
+
+
+def _unexplained(setting, fitted):
+    small = ("misfit", MISFIT_LENGTH, 0.3)
+    return [[log_evidence(setting, fitted, small, (kind, length, level)) for level in UNKNOWN_LEVELS] for kind, length in UNKNOWN_KINDS]
 
 
 def _promising_pairs(none, singles, screens, whitening):

@@ -12,9 +12,9 @@ from scipy.linalg import cholesky, solve_triangular
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
 
-FORMULA_ERROR = 0.12
+FORMULA_ERROR = 0.2
 """Standard deviation by which an effect's contribution may differ from its formula, relative to the contribution."""
-FORMULA_LENGTH = 0.12
+FORMULA_LENGTH = 0.06
 
 
 def log_evidence(setting: Setting, fitted: Fitted, *terms) -> float:

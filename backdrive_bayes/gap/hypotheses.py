@@ -12,7 +12,7 @@ from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import members_named
 
 SCREENED = 256
-STARTS = 3
+STARTS = 2
 PROBE = 1e-4
 
 
@@ -38,9 +38,9 @@ def joint_problem(setting: Setting, effects, whitening: Whitening) -> JointProbl
     return JointProblem(model, base.records, 0.0, whitener=whitening.matrix)
 
 
-def fit_from(problem: JointProblem, effects, starts, max_steps: int = 30) -> Fitted:
+def fit_from(problem: JointProblem, effects, starts, max_steps: int = 14) -> Fitted:
     """The best mode reached from ``starts`` (starts, dimension)."""
-    z = find_optimum(problem, starts, max_steps).z
+    z = find_optimum(problem, starts, max_steps, first_steps=6, finalists=1).z
     return linearised(problem, effects, z)
 
 
@@ -140,6 +140,11 @@ def fit_none(setting: Setting, whitening: Whitening) -> Fitted:
     return fit_from(joint_problem(setting, (), whitening), (), [setting.z])
 
 
-def fit_screened(found: Screen, effects, max_steps: int = 30) -> Fitted:
+def fit_screened(found: Screen, effects) -> Fitted:
     """The best mode from the starts of a screen."""
-    return fit_from(found.problem, effects, found.starts, max_steps)
+    return fit_from(found.problem, effects, found.starts)
+
+
+def polished(fitted: Fitted) -> Fitted:
+    """The same hypothesis climbed further."""
+    return fit_from(fitted.problem, fitted.effects, [fitted.z], 30)

@@ -12,7 +12,7 @@ from backdrive_bayes.inference.fit import prepare
 from backdrive_bayes.inference.problem import Problem
 from backdrive_bayes.records.record import Unit
 
-MOST_BLOCKS = 800
+MOST_BLOCKS = 640
 MISFIT_LENGTH = 0.06
 
 

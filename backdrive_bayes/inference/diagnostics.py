@@ -17,8 +17,8 @@ class Outcome(enum.Enum):
 
     CONVERGED = "converged"
     NOT_CONVERGED = (
-        "not converged within the budget: give it more time (--budget), or leave out the member whose parameter mixes worst "
-        "(--baseline)"
+        "not converged within the budget: go on with more time (--resume --budget SECONDS), or leave out the member whose "
+        "parameter mixes worst (--baseline)"
     )
 
 

@@ -1,10 +1,10 @@
 """Model discrepancy: a Gaussian process along the loop, orthogonal to the parameters' own directions.
 
-Reality is the model plus a smooth function of the position on the loop. The function is a random Fourier series on the closed loop
-(its coordinate grows evenly with torque, with angle and with the logarithm of torque, so that cliffs and the neighbourhood of
-zero torque get their share), plus a series of its own on the first
-leg. Taking out the parameters' directions keeps their meaning (Plumlee 2017, doi:10.1080/01621459.2016.1211016); scale and length
-maximise the evidence of the residual.
+Reality is the model plus a smooth function of the position on the loop. The function is a random Fourier series on the
+closed loop (its coordinate grows evenly with torque, with angle and with the logarithm of torque, so that cliffs and the
+neighbourhood of zero torque get their share), plus a series of its own on the first leg. Taking out the parameters' directions
+keeps their meaning (Plumlee 2017, doi:10.1080/01621459.2016.1211016); scale and length maximise the evidence of the
+residual.
 """
 
 from __future__ import annotations

@@ -13,14 +13,16 @@ from backdrive_bayes.inference.chain_file import Unfinished
 from backdrive_bayes.inference.diagnostics import Convergence, Outcome, diagnose_draws
 from backdrive_bayes.inference.discrepancy import Discrepancy, learn_discrepancy
 from backdrive_bayes.inference.noise_refinement import refine_noise
-from backdrive_bayes.inference.optimum import Optimum, find_optimum, screen_starts
+from backdrive_bayes.inference.optimum import Optimum, find_optimum
 from backdrive_bayes.inference.problem import Problem, RecordData
-from backdrive_bayes.inference.sampling import Ensembles, Settings, continue_ensembles, run_ensembles, warm_up
+from backdrive_bayes.inference.sampling import Ensembles, Settings, begin_ensembles, run_ensembles, warm_up
+from backdrive_bayes.inference.starts import feature_starts, screened_starts, with_other_pasts
 from backdrive_bayes.model.parameter import Scale
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import BASELINE, members_named
 from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import reduce_record
@@ -85,6 +87,7 @@ def angle_scale_rad(unit: Unit) -> float:
 
 def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, blocks_per_segment: int | None = None) -> Prepared:
     """Reduce the records, find the mode and learn noise and discrepancy; ``scale`` overrides the priors' scale."""
+    unit = without_wild(unit)
     scale = scale or Scale(unit.rated_torque_nm, angle_scale_rad(unit))
     model = ReducerModel(members_named(baseline), scale)
     # A loop from rest has two and a half legs.
@@ -95,7 +98,8 @@ def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, bloc
     )
     blocks = [reduce_record(r, s, n, blocks_per_segment) for r, s, n in zip(unit.records, segments, noise, strict=True)]
     problem = Problem(model, tuple(RecordData.prepare(b, n) for b, n in zip(blocks, noise, strict=True)))
-    optimum = find_optimum(problem, screen_starts(problem, rng))
+    optimum = find_optimum(problem, np.concatenate([screened_starts(problem, rng), feature_starts(problem, rng)]))
+    optimum = find_optimum(problem, [optimum.z, with_other_pasts(problem, optimum.z, rng)])
     return _refine(problem, optimum)
 
 
@@ -182,13 +186,10 @@ def _fit(unit, baseline, seed, settings, quantities, scale, resume, progress) ->
     progress("reducing the records and finding the posterior mode")
     prepared = prepare(unit, rng, baseline, scale)
     if resume:
-        restarts = resume.restarts
-        for best in restarts:
-            prepared = _from_better_mode(prepared, best)
-        chains = resume.chains(prepared.problem.log_posterior)
+        prepared, chains, restarts = _resumed(prepared, resume)
     else:
         progress("warming up the ensembles")
-        prepared, proposal, restarts = _warmed_up(prepared, rng, settings, seconds_left)
+        prepared, chains, restarts = _begun(prepared, rng, settings, seconds_left)
     problem, discrepancy = prepared.problem, prepared.discrepancy
     state: dict = {}
 
@@ -203,16 +204,12 @@ def _fit(unit, baseline, seed, settings, quantities, scale, resume, progress) ->
         progress(_line(drawn, convergence))
         return convergence.outcome is Outcome.CONVERGED
 
-    if resume:
-        rng = np.random.default_rng([seed, 3, chains.samplers[0].iteration])
-        drawn = continue_ensembles(problem.log_posterior, chains, rng, settings, enough, seconds_left)
-    else:
-        drawn = run_ensembles(problem.log_posterior, proposal, rng, settings, enough, seconds_left)
+    drawn = run_ensembles(problem.log_posterior, chains, rng, settings, enough, seconds_left)
     return Posterior(unit, problem, discrepancy, drawn, state["weights"], state["convergence"], seed, restarts)
 
 
-def _warmed_up(prepared, rng, settings, seconds_left):
-    """The problem at the best mode that warm-up knows, a proposal, and the points (times, dimension) that were better modes."""
+def _begun(prepared, rng, settings, seconds_left):
+    """The problem at the best mode that warm-up knows, its ensembles, and the points (times, dimension) of better modes."""
     restarts = []
     for _ in range(3):
         problem, optimum = prepared.problem, prepared.optimum
@@ -221,7 +218,15 @@ def _warmed_up(prepared, rng, settings, seconds_left):
             break
         restarts.append(best)
         prepared = _from_better_mode(prepared, best)
-    return prepared, proposal, np.reshape(restarts, (-1, prepared.problem.dimension))
+    chains = begin_ensembles(prepared.problem.log_posterior, proposal, rng, settings)
+    return prepared, chains, np.reshape(restarts, (-1, prepared.problem.dimension))
+
+
+def _resumed(prepared, resume):
+    """The same three of a fit that has begun before."""
+    for best in resume.restarts:
+        prepared = _from_better_mode(prepared, best)
+    return prepared, resume.chains(prepared.problem.log_posterior), resume.restarts
 
 
 def _from_better_mode(prepared, best) -> Prepared:

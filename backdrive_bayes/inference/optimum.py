@@ -23,13 +23,13 @@ class Optimum:
     log_posterior: float
 
 
-def find_optimum(problem: Problem, starts, max_steps: int = 80) -> Optimum:
+def find_optimum(problem: Problem, starts, max_steps: int = 80, first_steps: int = 12, finalists: int = 2) -> Optimum:
     """Best posterior mode found by Levenberg-Marquardt from ``starts`` (starts, dimension).
 
-    All starts climb a little, the best two of them to the end.
+    All starts climb ``first_steps``, the best ``finalists`` of them to the end.
     """
-    climbed = sorted((_climb(problem, z, 12) for z in starts), key=lambda pair: -pair[1])
-    best = max((_climb(problem, z, max_steps) for z, _ in climbed[:2]), key=lambda pair: pair[1])
+    climbed = sorted((_climb(problem, z, first_steps) for z in starts), key=lambda pair: -pair[1])
+    best = max((_climb(problem, z, max_steps) for z, _ in climbed[:finalists]), key=lambda pair: pair[1])
     return laplace(problem, best[0])
 
 

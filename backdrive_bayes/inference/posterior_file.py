@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.errors import BadInput
 from backdrive_bayes.inference.fit import Posterior
+from backdrive_bayes.results import POSTERIOR
 
-SCHEMA = "backdrive-bayes/posterior/1"
 PREDICTIVE_PER_ENSEMBLE = 50
 
 
@@ -63,7 +62,7 @@ def _attributes(posterior):
     problem, discrepancy = posterior.problem, posterior.discrepancy
     packages = ("backdrive-bayes", "numpy", "scipy", "emcee", "arviz")
     return {
-        "schema": SCHEMA,
+        "schema": POSTERIOR,
         "unit": posterior.unit.name,
         "data_sha256": posterior.unit.data_hash,
         "modules": ",".join(problem.model.names),
@@ -166,17 +165,3 @@ def _discrepancy_variables(posterior):
             np.concatenate([np.full(x.blocks.turning_nm.size, r) for r, x in enumerate(posterior.problem.records)]),
         ),
     }
-
-
-def read_group(path: Path, group: str):
-    """One group of a posterior file as an xarray dataset in memory; BadInput where the file is not one of ours."""
-    import xarray
-
-    try:
-        with xarray.open_dataset(path, group=group, engine="h5netcdf") as dataset:
-            loaded = dataset.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise BadInput(path, f"a posterior.nc with group '{group}'", f"unreadable file ({type(error).__name__})") from None
-    if loaded.attrs.get("schema") != SCHEMA:
-        raise BadInput(path, f"schema '{SCHEMA}'", repr(loaded.attrs.get("schema")))
-    return loaded

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.inference.posterior_file import read_group
 from backdrive_bayes.model.parameter import Scale
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import members_named
+from backdrive_bayes.results import read_group
 
 DRAWS = 500
 HARMONICS = 48

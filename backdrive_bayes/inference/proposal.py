@@ -10,6 +10,7 @@ from scipy.special import gammaln, logsumexp
 DEGREES = 8.0
 BROAD_SHARE = 0.1
 BROAD_STRETCH = 2.0
+PARTS = (1, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +114,25 @@ def temper(weight, share):
         if effective_share(w) >= min(share, 0.9) or power < 1e-3:
             return w
         power *= 0.8
+
+
+def best_mixture(fitted, held_out, rng):
+    """The mixture fitted to draws (n, dimension) that held-out walkers find most likely, and their mean log density."""
+    fitted = fitted[rng.permutation(fitted.shape[0])[:3000]]
+    even = np.full(fitted.shape[0], 1 / fitted.shape[0])
+    tried = [fit_mixture(fitted, even, rng, parts) for parts in PARTS]
+    scores = [float(np.mean(q.log_density(held_out))) for q in tried]
+    return tried[int(np.argmax(scores))], max(scores)
+
+
+def polish(log_posterior, proposal, rng, rounds: int = 3, n: int = 1024):
+    """The best of ``proposal`` and its importance-weighted refits, with its effective share."""
+    best, best_share = proposal, -1.0
+    for k in range(rounds):
+        z, _, weight = importance(log_posterior, proposal, rng, n)
+        share = effective_share(weight)
+        if share > best_share:
+            best, best_share = proposal, share
+        if k + 1 < rounds:
+            proposal = fit_mixture(z, temper(weight, max(0.05, 5 * z.shape[1] / n)), rng, 1)
+    return best, best_share

@@ -7,15 +7,17 @@ proposal (a Student-t mixture) and differential evolution. R-hat and ESS are tak
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import emcee
+import h5py
 import numpy as np
+from emcee.backends import Backend, HDFBackend
 from emcee.moves import DEMove, Move
 
-from backdrive_bayes.inference.proposal import StudentMixture, effective_share, fit_mixture, importance, temper
+from backdrive_bayes.inference.proposal import StudentMixture, best_mixture, importance, polish, temper
 
-PARTS = (1, 4)
 WORTHWHILE = 0.5
 """By how many nats a draw a refitted proposal must be better for the draws made so far to be given up."""
 
@@ -59,10 +61,18 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False)
+class Chains:
+    """Ensembles at work: emcee's samplers, the proposal they move by, and how often it may still be refitted."""
+
+    samplers: tuple[emcee.EnsembleSampler, ...]
+    proposal: StudentMixture
+    refits_left: int
+
+@dataclass(frozen=True, eq=False)
 class Ensembles:
     """What the independent ensembles drew: ``z`` (ensembles, draws, dimension), kept evenly in time and walker by walker.
 
-    ``step`` (ensembles, draws) is the step at which each was drawn.
+    ``step`` (ensembles, draws) is the step at which each was drawn. ``chains`` can go on where time ran out, else None.
     """
 
     z: np.ndarray
@@ -70,7 +80,7 @@ class Ensembles:
     step: np.ndarray
     acceptance: float
     steps: int
-    proposal: StudentMixture
+    chains: Chains | None = None
 
 
 def warm_up(log_posterior, mode, covariance, rng, settings: Settings, seconds_left):
@@ -78,7 +88,7 @@ def warm_up(log_posterior, mode, covariance, rng, settings: Settings, seconds_le
 
     Returns the proposal and the best point seen.
     """
-    proposal, share = _polish(log_posterior, StudentMixture.single(mode, covariance), rng)
+    proposal, share = polish(log_posterior, StudentMixture.single(mode, covariance), rng)
     walkers = _walkers(settings, mode.size)
     state, best = _starts(log_posterior, proposal, rng, walkers)
     sampler = _sampler(walkers, mode.size, log_posterior, [(DEMove(), 0.9), (DEMove(gamma0=1.0), 0.1)], rng)
@@ -91,32 +101,10 @@ def warm_up(log_posterior, mode, covariance, rng, settings: Settings, seconds_le
         history.append(sampler.get_chain(thin=4))
         recent = np.concatenate(history[len(history) // 2 :])
         one, other = (recent[:, half].reshape(-1, mode.size) for half in (slice(None, None, 2), slice(1, None, 2)))
-        proposal, _ = _refit(one, other, rng)
-        proposal, share = _polish(log_posterior, proposal, rng, rounds=1)
+        proposal, _ = best_mixture(one, other, rng)
+        proposal, share = polish(log_posterior, proposal, rng, rounds=1)
         best = state.coords[np.argmax(state.log_prob)]
     return proposal, best
-
-
-def _refit(fitted, held_out, rng):
-    """The mixture fitted to draws (n, dimension) that held-out walkers find most likely, and their mean log density."""
-    fitted = fitted[rng.permutation(fitted.shape[0])[:3000]]
-    even = np.full(fitted.shape[0], 1 / fitted.shape[0])
-    tried = [fit_mixture(fitted, even, rng, parts) for parts in PARTS]
-    scores = [float(np.mean(q.log_density(held_out))) for q in tried]
-    return tried[int(np.argmax(scores))], max(scores)
-
-
-def _polish(log_posterior, proposal, rng, rounds: int = 3, n: int = 1024):
-    """The best of ``proposal`` and its importance-weighted refits, with its effective share."""
-    best, best_share = proposal, -1.0
-    for k in range(rounds):
-        z, _, weight = importance(log_posterior, proposal, rng, n)
-        share = effective_share(weight)
-        if share > best_share:
-            best, best_share = proposal, share
-        if k + 1 < rounds:
-            proposal = fit_mixture(z, temper(weight, max(0.05, 5 * z.shape[1] / n)), rng, 1)
-    return best, best_share
 
 
 def _starts(log_posterior, proposal, rng, walkers):
@@ -126,46 +114,62 @@ def _starts(log_posterior, proposal, rng, walkers):
     return z[picked], z[np.argmax(value)]
 
 
-def run_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settings, enough, seconds_left) -> Ensembles:
-    """Independent ensembles until ``enough(Ensembles)`` or until ``seconds_left()`` is zero.
+def begin_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settings) -> Chains:
+    """Independent ensembles with their burn-in behind them."""
+    walkers = _walkers(settings, proposal.mean.shape[1])
+    starts = [_starts(log_posterior, proposal, rng, walkers)[0] for _ in range(settings.ensembles)]
+    return _begin(log_posterior, proposal, starts, settings.refits, rng, settings)
+
+
+def run_ensembles(log_posterior, chains: Chains, rng, settings: Settings, enough, seconds_left) -> Ensembles:
+    """Go on until ``enough(Ensembles)`` or until ``seconds_left()`` is zero.
 
     While they have not converged, the proposal is refitted to what they drew; where that makes it clearly better, all is drawn
     anew, so that adaptation never enters the draws that are kept.
     """
-    walkers = _walkers(settings, proposal.mean.shape[1])
-    states = [_starts(log_posterior, proposal, rng, walkers)[0] for _ in range(settings.ensembles)]
-    refits_left, steps = settings.refits, settings.block
-    samplers, states = _begin(log_posterior, proposal, states, rng, settings)
+    steps = max(settings.block, chains.samplers[0].iteration // 2)
     while True:
         began = time.perf_counter()
-        states = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)]
-        drawn = _collect(samplers, proposal, settings.kept_per_ensemble)
-        if enough(drawn) or seconds_left() <= 0:
+        for sampler in chains.samplers:
+            sampler.run_mcmc(None, steps, skip_initial_state_check=True)
+        drawn = _collect(chains.samplers, settings.kept_per_ensemble)
+        if enough(drawn):
             return drawn
+        if seconds_left() <= 0:
+            return replace(drawn, chains=chains)
         affordable = int(seconds_left() * steps / (time.perf_counter() - began))
         steps = max(10, min(max(steps, drawn.steps // 2), affordable))
-        chains = [s.get_chain(flat=True) for s in samplers]
-        held_out = np.concatenate(chains[1::2] or chains)
-        held_out = held_out[:: max(1, held_out.shape[0] // 3000)]
-        better, score = _refit(np.concatenate(chains[::2]), held_out, rng)
-        # How likely the proposal finds the chain's own draws tells of regions that it misses; importance weights cannot.
-        if refits_left and score > float(np.mean(proposal.log_density(held_out))) + WORTHWHILE:
-            refits_left -= 1
-            proposal = better
-            samplers, states = _begin(log_posterior, proposal, states, rng, settings)
+        chains = _refitted(log_posterior, chains, rng, settings)
 
 
-def _begin(log_posterior, proposal, states, rng, settings):
+def _refitted(log_posterior, chains, rng, settings):
+    """The same chains, or new ones from where they stand with a proposal that is clearly better."""
+    flat = [s.get_chain(flat=True) for s in chains.samplers]
+    held_out = np.concatenate(flat[1::2] or flat)
+    held_out = held_out[:: max(1, held_out.shape[0] // 3000)]
+    better, score = best_mixture(np.concatenate(flat[::2]), held_out, rng)
+    # How likely the proposal finds the chain's own draws tells of regions that it misses; importance weights cannot.
+    if not chains.refits_left or score <= float(np.mean(chains.proposal.log_density(held_out))) + WORTHWHILE:
+        return chains
+    states = [s.get_last_sample() for s in chains.samplers]
+    return _begin(log_posterior, better, states, chains.refits_left - 1, rng, settings)
+
+
+def _begin(log_posterior, proposal, states, refits_left, rng, settings):
     """Fresh samplers with their burn-in behind them."""
-    moves = [(IndependenceMove(proposal), 0.7), (DEMove(), 0.25), (DEMove(gamma0=1.0), 0.05)]
-    samplers = [_sampler(_walkers(settings, proposal.mean.shape[1]), proposal.mean.shape[1], log_posterior, moves, rng) for _ in states]
-    burnt = [s.run_mcmc(x, settings.block // 2, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)]
-    for sampler in samplers:
+    dimension = proposal.mean.shape[1]
+    samplers = tuple(_sampler(_walkers(settings, dimension), dimension, log_posterior, _moves(proposal), rng) for _ in states)
+    for sampler, state in zip(samplers, states, strict=True):
+        sampler.run_mcmc(state, settings.block // 2, skip_initial_state_check=True)
         sampler.reset()
-    return samplers, burnt
+    return Chains(samplers, proposal, refits_left)
 
 
-def _collect(samplers, proposal, kept):
+def _moves(proposal):
+    return [(IndependenceMove(proposal), 0.7), (DEMove(), 0.25), (DEMove(gamma0=1.0), 0.05)]
+
+
+def _collect(samplers, kept):
     steps, walkers = samplers[0].iteration, samplers[0].nwalkers
     thin = max(1, int(np.ceil(steps * walkers / kept)))
     picked = np.arange((steps - 1) % thin, steps, thin)
@@ -173,7 +177,7 @@ def _collect(samplers, proposal, kept):
     value = np.stack([s.get_log_prob()[picked].T.ravel() for s in samplers])
     step = np.broadcast_to(np.tile(picked, walkers), value.shape)
     acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
-    return Ensembles(z, value, step, acceptance, steps, proposal)
+    return Ensembles(z, value, step, acceptance, steps)
 
 
 def _walkers(settings, dimension):
@@ -185,3 +189,41 @@ def _sampler(walkers, dimension, log_posterior, moves, rng):
     # Unseeded samplers of one process share their random state: each gets its own.
     sampler.random_state = np.random.RandomState(rng.integers(2**31)).get_state()
     return sampler
+
+
+def save_chains(chains: Chains, path: Path) -> None:
+    """Add the ensembles to an HDF5 file, each a group as emcee's HDFBackend keeps it, and their proposal."""
+    for k, sampler in enumerate(chains.samplers):
+        drawn, kept = sampler.backend, HDFBackend(path, name=f"ensemble_{k}")
+        kept.reset(*drawn.shape)
+        kept.grow(drawn.iteration, None)
+        # All steps at once: HDFBackend opens and closes its file at every step.
+        with kept.open("a") as file:
+            group = file[kept.name]
+            group["chain"][...], group["log_prob"][...] = drawn.get_chain(), drawn.get_log_prob()
+            group["accepted"][...] = drawn.accepted
+            group.attrs.update({f"random_state_{i}": part for i, part in enumerate(drawn.random_state)})
+            group.attrs["iteration"] = drawn.iteration
+    with h5py.File(path, "a") as file:
+        file.attrs.update(ensembles=len(chains.samplers), refits_left=chains.refits_left)
+        file.create_group("proposal").update(vars(chains.proposal))
+
+
+def load_chains(path: Path, log_posterior) -> Chains:
+    """Ensembles that go on where those of :func:`save_chains` stood; KeyError, OSError or ValueError where they cannot."""
+    with h5py.File(path) as file:
+        proposal = StudentMixture(**{name: part[()] for name, part in file["proposal"].items()})
+        count, refits_left = int(file.attrs["ensembles"]), int(file.attrs["refits_left"])
+    backends = [_in_memory(HDFBackend(path, name=f"ensemble_{k}", read_only=True)) for k in range(count)]
+    samplers = [
+        emcee.EnsembleSampler(*b.shape, log_posterior, moves=_moves(proposal), vectorize=True, backend=b) for b in backends
+    ]
+    return Chains(tuple(samplers), proposal, refits_left)
+
+
+def _in_memory(kept: HDFBackend) -> Backend:
+    drawn = Backend()
+    drawn.reset(*kept.shape)
+    drawn.chain, drawn.log_prob, drawn.accepted = kept.get_chain(), kept.get_log_prob(), kept.accepted
+    drawn.iteration, drawn.random_state = int(kept.iteration), kept.random_state
+    return drawn

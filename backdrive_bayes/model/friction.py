@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import weakref
 
 import numpy as np
@@ -42,18 +43,26 @@ class Friction:
 
     def respond(self, values, drive):
         """Transmitted torque [N·m] of shape (…, samples)."""
-        spread, start = values["friction_spread"], values["initial_friction_state"]
-        constant = hat_weights(CONSTANT_SHARES, values["friction_torque"] / drive.rated_torque_nm, spread)
-        load = hat_weights(LOAD_RATIOS, values["friction_ratio"], spread)
-        weights = (constant[..., :, None] * load[..., None, :]).reshape(*constant.shape[:-1], -1)
-        free = values["free_share"]
-        weights *= 1 - free
-        # The first element of the bank has no threshold: it passes the torque as it is.
-        weights[..., :1] += free
+        level, start = values["friction_torque"] / drive.rated_torque_nm, values["initial_friction_state"]
+        shared = (level, values["friction_ratio"], values["friction_spread"], values["free_share"])
+        weights = _weights(*((np.shape(v), np.asarray(v, float).tobytes()) for v in shared))
         past = np.concatenate([weights * np.maximum(start, 0), weights * np.maximum(-start, 0)], axis=-1)
         if np.ndim(drive.shift_nm) == 0:
             return _bank(drive.path, drive.rated_torque_nm, 0).passed(weights, past)
         return _passed_shifted(drive, weights, past)
+
+
+@functools.lru_cache(maxsize=2)
+def _weights(*shared: tuple[tuple[int, ...], bytes]) -> np.ndarray:
+    """Weights of the bank's elements, shape (…, elements); the records of a unit ask for the same ones in turn."""
+    level, ratio, spread, free = (np.frombuffer(data).reshape(shape) for shape, data in shared)
+    constant, load = hat_weights(CONSTANT_SHARES, level, spread), hat_weights(LOAD_RATIOS, ratio, spread)
+    weights = (constant[..., :, None] * load[..., None, :]).reshape(*constant.shape[:-1], -1)
+    weights *= 1 - free
+    # The first element of the bank has no threshold: it passes the torque as it is.
+    weights[..., :1] += free
+    weights.flags.writeable = False
+    return weights
 
 
 def hat_weights(nodes, mean, spread):

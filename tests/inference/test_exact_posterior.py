@@ -18,7 +18,8 @@ from support.known import RATED
 from backdrive_bayes.bench.known_truth import BenchNoise, ramp
 from backdrive_bayes.inference.covariance import block_covariance
 from backdrive_bayes.inference.fit import corrected_blocks
-from backdrive_bayes.inference.optimum import find_optimum, laplace, screen_starts
+from backdrive_bayes.inference.optimum import find_optimum, laplace
+from backdrive_bayes.inference.starts import screened_starts
 from backdrive_bayes.inference.problem import RecordData
 from backdrive_bayes.model.path import TorquePath
 
@@ -41,11 +42,11 @@ def exact_log_likelihood(problem, unit, z, noise):
 @pytest.fixture(scope="module")
 def exact():
     """Points about the mode, their coordinates in standard deviations, and the exact likelihood there."""
-    unit = unit_of(5, rate=RATE, noise=NOISE)
+    unit = unit_of(5, rate=RATE, noise=NOISE, hardening_torque=0.5 * RATED)
     assert unit.records[0].time_s.size == 6001
     problem = problem_of(unit, NOISE)
     rng = np.random.default_rng(0)
-    optimum = find_optimum(problem, screen_starts(problem, rng))
+    optimum = find_optimum(problem, screened_starts(problem, rng))
     z, unit_z = Laplace(optimum.z, optimum.covariance).points(rng, POINTS)
     return unit, z, unit_z, exact_log_likelihood(problem, unit, z, NOISE)
 

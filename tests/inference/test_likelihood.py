@@ -116,7 +116,7 @@ def test_nan_of_a_model_raises(problem, points):
 
 def test_per_record_parameters_touch_their_own_record_only(problem, points):
     own = [i for i, c in enumerate(problem.coordinates) if c.record == 1]
-    assert len(own) == 2 and len(set(problem.labels)) == problem.dimension
+    assert len(own) == 3 and len(set(problem.labels)) == problem.dimension
     moved = points.copy()
     moved[:, own] += 0.5
     before, after = problem.residuals(points), problem.residuals(moved)

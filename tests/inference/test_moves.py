@@ -6,7 +6,7 @@ import pytest
 from emcee.moves import DEMove, DESnookerMove
 from support.targets import Banana, agrees, along_the_ridge, disagreement, moments_by_importance
 
-from backdrive_bayes.inference.sampling import IndependenceMove, Settings, run_ensembles, warm_up
+from backdrive_bayes.inference.sampling import IndependenceMove, Settings, begin_ensembles, run_ensembles, warm_up
 
 ENSEMBLES, WALKERS = 8, 64
 RIDGE = along_the_ridge()
@@ -96,8 +96,9 @@ def run(seed, walkers=WALKERS):
     )
     proposal, best = warm_up(Banana.log_posterior, Banana.mean, np.diag(Banana.sd**2), rng, settings, lambda: 1e9)
     assert Banana.log_posterior(best)[0] > Banana.log_posterior(Banana.mean)[0] - 5
+    chains = begin_ensembles(Banana.log_posterior, proposal, rng, settings)
     return run_ensembles(
-        Banana.log_posterior, proposal, rng, settings, lambda drawn: drawn.steps >= 700, lambda: 1e9
+        Banana.log_posterior, chains, rng, settings, lambda drawn: drawn.steps >= 700, lambda: 1e9
     )
 
 
@@ -130,9 +131,9 @@ def test_a_seed_fixes_every_draw_and_kept_draws_are_bounded():
     settings = Settings(ensembles=2, walkers=16, block=20, kept_per_ensemble=100)
 
     def once(seed):
-        return run_ensembles(
-            Banana.log_posterior, RIDGE, np.random.default_rng(seed), settings, lambda d: False, lambda: 0.0
-        )
+        rng = np.random.default_rng(seed)
+        chains = begin_ensembles(Banana.log_posterior, RIDGE, rng, settings)
+        return run_ensembles(Banana.log_posterior, chains, rng, settings, lambda d: False, lambda: 0.0)
 
     a, b, c = once(5), once(5), once(6)
     assert np.array_equal(a.z, b.z) and not np.array_equal(a.z, c.z)

@@ -31,10 +31,10 @@ def known_estimate(noise: BenchNoise, dof=1e9):
     )
 
 
-def unit_of(seed=0, *, z=0.3, rate=0.05, noise=KNOWN_NOISE, amplitudes=(RATED,)) -> Unit:
-    """A simulated unit of the baseline, one record an amplitude."""
+def unit_of(seed=0, *, z=0.3, rate=0.05, noise=KNOWN_NOISE, amplitudes=(RATED,), **changes) -> Unit:
+    """A simulated unit of the baseline, one record an amplitude; ``changes`` replace values."""
     model = reducer()
-    values = typical_values(model, z)
+    values = typical_values(model, z) | changes
     loops = [(a, rate) for a in amplitudes]
     return simulate_unit(model, [values] * len(loops), loops, noise, np.random.default_rng(seed))
 

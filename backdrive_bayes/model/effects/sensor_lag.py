@@ -25,14 +25,16 @@ class SensorLag:
         """What the lag adds to the reading [rad], shape (…, samples)."""
         time, angle = drive.path.time_s, drive.angle_rad
         low_pass = np.maximum(values["lag_time"] * values["lag_low_pass_share"], 1e-15)
-        slow = relax(angle, time, low_pass, angle[..., :1])
+        # The record begins half a sample before its first sample, at rest.
+        begin = 1.5 * angle[..., :1] - 0.5 * angle[..., 1:2]
+        slow = relax(angle, time, low_pass, begin)
         return delayed(slow, time, values["lag_time"] * (1 - values["lag_low_pass_share"])) - angle
 
 
 def delayed(signal, time_s, delay_s):
-    """Signal (…, samples) read ``delay_s`` (…, 1) later, straight between samples, constant before the first."""
+    """Signal (…, samples) read ``delay_s`` (…, 1) later, straight between samples, constant half a sample before the first."""
     signal = np.asarray(signal)
-    wanted = np.maximum(time_s - delay_s, time_s[0])
+    wanted = np.maximum(time_s - delay_s, 1.5 * time_s[0] - 0.5 * time_s[1])
     right = np.clip(np.searchsorted(time_s, wanted), 1, time_s.size - 1)
     share = (wanted - time_s[right - 1]) / (time_s[right] - time_s[right - 1])
     shape = np.broadcast_shapes(signal.shape, wanted.shape)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.model.member import Stage
-from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter, Uniform
+from backdrive_bayes.model.parameter import LogNormal, LogUniform, Normal, Parameter, Uniform
 from backdrive_bayes.model.relaxation import relax
 
 SLOWER = 6.0
@@ -14,7 +14,10 @@ POLYMER = "weakly informative: delayed compliance of some per cent of the elasti
 
 
 class ViscoelasticCreep:
-    """Two Kelvin-Voigt elements in series, relaxing with T and 6T towards the load's part above a creep threshold."""
+    """Two Kelvin-Voigt elements in series, relaxing with T and 6T towards the load's part above a creep threshold.
+
+    They begin ``initial_creep`` rated torques away from rest.
+    """
 
     name = "viscoelastic_creep"
     stage = Stage.COMPLIANCE
@@ -25,6 +28,7 @@ class ViscoelasticCreep:
         # Faster creep would be lag of the sensor, slower creep compliance.
         Parameter("creep_time", "s", "none", LogUniform(0.3, 30.0), None, POLYMER),
         Parameter("creep_slow_share", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
+        Parameter("initial_creep", "1", "none", Normal(0.3), None, "the unit's past is unknown", True),
         Parameter("creep_threshold", "N·m", "torque", Uniform(0.0, 0.7), None, "no preference"),
     )
 
@@ -33,6 +37,6 @@ class ViscoelasticCreep:
         load = drive.transmitted_nm
         load = load - np.clip(load, -values["creep_threshold"], values["creep_threshold"])
         time, constant, slow = drive.path.time_s, values["creep_time"], values["creep_slow_share"]
-        start = load[..., :1]
+        start = load[..., :1] + values["initial_creep"] * drive.rated_torque_nm
         fast = relax(load, time, constant, start)
         return values["creep_compliance"] * (fast + slow * (relax(load, time, SLOWER * constant, start) - fast))

@@ -1,0 +1,192 @@
+"""The whole diagnosis of one unit, from its records to the contract's diagnosis.json."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from backdrive_bayes.gap import draws, next_test, where
+from backdrive_bayes.gap.candidates import REFERENCE, Candidates, Weighed, weigh_all
+from backdrive_bayes.gap.fast import Fast, weigh_fast
+from backdrive_bayes.gap.probabilities import credible_set, marginal, probabilities
+from backdrive_bayes.gap.setting import Setting
+from backdrive_bayes.gap.shrink import closed_fraction, shrink
+from backdrive_bayes.indicators.summary import interval, loading_rate_nm_per_s
+from backdrive_bayes.inference.discrepancy import amplitude_nm
+from backdrive_bayes.model.registry import BASELINE, candidates_beside
+from backdrive_bayes.records.record import Unit
+
+LEVEL = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What was found: the contract's object and the names of the effects to add to the model, () for none or unknown."""
+
+    json: dict
+    effects: tuple[str, ...]
+
+
+def diagnose(
+    unit: Unit, *, baseline=BASELINE, seed: int = 0, allowed=None, k: float = 0.03, progress: Callable[[str], None] = lambda text: None
+) -> Diagnosis:
+    """Where model and measurement part, which effect causes it, how far the gap shrinks with it.
+
+    ``allowed`` names the effects of the library (default: all that the baseline does not hold).
+    """
+    # The arrays are small: BLAS threads would spend their time waiting for each other.
+    with threadpool_limits(1, user_api="blas"):
+        return _diagnose(unit, tuple(baseline), seed, allowed, k, progress)
+
+
+def _diagnose(unit, baseline, seed, allowed, k, progress):
+    began, rng = time.perf_counter(), np.random.default_rng(seed)
+    progress("reducing the records and fitting the baseline")
+    setting = Setting.of(unit, rng, baseline)
+    candidates = weigh_all(setting, rng, progress, allowed)
+    progress("looking for jumps, vibration and encoder error")
+    fast = _allowed_fast(weigh_fast(setting, candidates.best.fitted), allowed)
+    joint = probabilities(candidates, fast)
+    labels = marginal(joint)
+    effects = max(joint, key=joint.get)
+    progress("where, and how far it shrinks")
+    found = _Found(setting, candidates, fast, labels, effects, rng, k)
+    result = found.as_json(baseline, allowed)
+    result["seconds"] = time.perf_counter() - began
+    named = () if effects == ("unknown",) else effects
+    return Diagnosis(result, named)
+
+
+def _allowed_fast(fast, allowed):
+    if allowed is None:
+        return fast
+    kept = {n: v for n, v in fast.log_evidence.items() if n in allowed or n == "vibration"}
+    return replace(fast, log_evidence=kept)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    setting: Setting
+    candidates: Candidates
+    fast: Fast
+    labels: dict
+    effects: tuple
+    rng: np.random.Generator
+    k: float
+
+    def as_json(self, baseline, allowed) -> dict:
+        gap = where.estimate_gap(self.setting, self.candidates.none)
+        cells = where.gap_map(self.setting, gap)
+        records = self.setting.problem.records
+        amplitudes = {d.blocks.name: amplitude_nm(self.setting.problem, r) for r, d in enumerate(records)}
+        chosen = self._chosen()
+        whitening = self.setting.whitening(REFERENCE)
+        none = self.candidates.none.fitted
+        z_none, z_chosen = (draws.laplace_draws(f, whitening, self.rng) for f in (none, chosen.fitted))
+        return {
+            "schema": "backdrive-bayes/diagnosis/1",
+            "unit": self.setting.unit.name,
+            "baseline": list(baseline),
+            "level": LEVEL,
+            "k": self.k,
+            "inconclusive": "",
+            "records": [
+                {"file": d.blocks.name, "loading_rate_Nm_per_s": loading_rate_nm_per_s(d), "amplitude_Nm": amplitudes[d.blocks.name]}
+                for d in records
+            ],
+            "gap": self._gap(gap),
+            "where": {"summary": where.summary(cells, amplitudes), "map": cells},
+            "which": self._which(chosen, z_chosen, allowed),
+            "answer": self._answer(),
+            "shrink": self._shrink(none, chosen, gap, z_none, z_chosen),
+            "next_test": self._next_test(whitening),
+            "parameter_shift": draws.shifts(none, z_none, chosen.fitted, z_chosen, LEVEL),
+            "residual": self._residual(none, chosen.fitted),
+            "convergence": None,
+        }
+
+    def _chosen(self) -> Weighed:
+        """The fitted hypothesis behind the answer: the best named one where the answer is unknown or was seen in fine blocks."""
+        exact = [w for w in self.candidates.weighed if set(w.effects) == set(self.effects)]
+        if exact:
+            return exact[0]
+        inside = [w for w in self.candidates.weighed if set(w.effects) <= set(self.effects)]
+        if self.effects == ("unknown",):
+            return self.candidates.best
+        return max(inside, key=lambda w: (len(w.effects), w.log_evidence.max()))
+
+    def _gap(self, gap):
+        weight = gap.weight / gap.weight.sum()
+        noise = float(weight @ np.diag(self.setting.noise))
+        return {
+            "probability": float(1 - self.labels.get("none", 0.0)),
+            "rms_rad": float(np.sqrt(weight @ gap.mean**2)),
+            "noise_floor_rad": float(np.sqrt(noise)),
+        }
+
+    def _which(self, chosen, z, allowed):
+        listed = {n for n in candidates_beside(self.setting.problem.model.names) if allowed is None or n in allowed}
+        labels = {name: 0.0 for name in (*sorted(listed), "unknown", "none")} | self.labels
+        table = draws.parameter_table(chosen.fitted, z, LEVEL)
+        rows = []
+        for label, p in sorted(labels.items(), key=lambda item: -item[1]):
+            row = {"effect": label, "probability": float(p)}
+            mine = {}
+            for name in label.split("+"):
+                if name in chosen.effects:
+                    mine |= draws.effect_parameters(chosen.fitted, table, name)
+            rows.append(row | ({"parameters": mine} if mine else {}))
+        return rows
+
+    def _answer(self):
+        names = [] if self.effects == () else list(self.effects)
+        return {"effects": names, "credible_set_90": credible_set(self.labels)}
+
+    def _shrink(self, none, chosen, gap, z_none, z_chosen):
+        found = shrink(self.setting, none, chosen.fitted, gap.weight, self.rng)
+        before, after = found.before.mean(axis=0), found.after.mean(axis=0)
+        floor, several = found.floor.mean(), len(self.setting.problem.records) > 1
+        control = closed_fraction(found.before.mean(), found.control.mean(), floor)
+        return {
+            "held_out": "records left out in turn" if several else "legs left out in turn",
+            "before_rad": float(np.sqrt(np.median(before))),
+            "after_rad": float(np.sqrt(np.median(after))),
+            "noise_floor_rad": float(np.sqrt(floor)),
+            "closed_fraction": interval(closed_fraction(before, after, floor), LEVEL),
+            "records": [
+                {
+                    "record": name,
+                    "before_rad": float(np.sqrt(np.median(b))),
+                    "after_rad": float(np.sqrt(np.median(a))),
+                    "noise_floor_rad": float(np.sqrt(f)),
+                    "closed_fraction": interval(closed_fraction(b, a, f), LEVEL),
+                }
+                for name, b, a, f in zip(found.names, found.before, found.after, found.floor, strict=True)
+            ],
+            "gaussian_process": {"closed_fraction": {"median": float(control), "lo": float(control), "hi": float(control)}},
+            "indicators": draws.indicator_change(self.setting, none, z_none, chosen.fitted, z_chosen, self.k, LEVEL),
+        }
+
+    def _next_test(self, whitening):
+        fitted = {"+".join(sorted(w.effects)) or "none": w.fitted for w in self.candidates.weighed}
+        likely = [(n, p) for n, p in self.labels.items() if "+".join(sorted(n.split("+"))) in fitted][:2]
+        if len(likely) < 2 or likely[1][1] < 0.01:
+            return None
+        pair = tuple(fitted["+".join(sorted(n.split("+")))] for n, _ in likely)
+        return next_test.propose(self.setting, pair, (likely[0][1], likely[1][1]), whitening, self.rng)
+
+    def _residual(self, none, chosen):
+        rows = []
+        for r, data in enumerate(self.setting.problem.records):
+            own = self.setting.places.record == r
+            before, after = (f.residual[own] - f.residual[own].mean() for f in (none, chosen))
+            rows.append({
+                "record": data.blocks.name, "torque_Nm": data.blocks.torque_nm.tolist(),
+                "direction": data.path.direction.astype(int).tolist(), "before_rad": before.tolist(), "after_rad": after.tolist(),
+                "noise_rad": float(np.sqrt(np.median(np.diag(self.setting.noise)[own]))),
+            })  # fmt: skip
+        return rows

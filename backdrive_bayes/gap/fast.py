@@ -1,0 +1,144 @@
+"""Fast structure: periodic in the angle, saw-toothed in the torque, periodic or rough in time, each with its evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.special import ive
+
+from backdrive_bayes.gap.fine import FineLeg, fine_legs
+from backdrive_bayes.gap.hypotheses import Fitted
+from backdrive_bayes.gap.setting import Setting
+
+AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
+"""Prior standard deviations of a fast component, in those of the noise."""
+SINE_AMPLITUDES = np.geomspace(0.05, 20.0, 24)
+PERIODS = 160
+HARMONICS = 3
+PIECE = 60
+"""Fine blocks of a leg over which skewness is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fast:
+    """Log evidence against no fast structure by name, and the best period of each (rad, N·m, s)."""
+
+    log_evidence: dict[str, float]
+    period: dict[str, float]
+
+
+def weigh_fast(setting: Setting, fitted: Fitted) -> Fast:
+    """Weigh every kind of fast structure beside a fitted hypothesis."""
+    legs = fine_legs(setting, fitted)
+    saw, jumps = _saw_of_torque(setting, legs, _torque_periods(setting)), _jumps(legs)
+    found = {
+        "encoder_error": _sine_of_angle(setting, legs, _angle_periods(legs)),
+        "stick_slip": max(saw, (jumps, float("nan"))),
+        "vibration": _lines(setting, fitted),
+    }
+    return Fast({k: v[0] for k, v in found.items()}, {k: v[1] for k, v in found.items()})
+
+
+def _angle_periods(legs):
+    step = np.median([np.median(np.abs(np.diff(leg.angle_rad))) for leg in legs])
+    span = max(np.ptp(leg.angle_rad) for leg in legs)
+    return np.geomspace(min(5 * step, 0.1 * span), 0.2 * span, PERIODS)
+
+
+def _torque_periods(setting):
+    return setting.unit.rated_torque_nm * np.geomspace(0.008, 0.25, PERIODS)
+
+
+def _sine_of_angle(setting, legs, periods):
+    """Log evidence of a sine of the angle read, of one amplitude in all records and a phase of each; and its period."""
+    amplitude = setting.noise_rad * SINE_AMPLITUDES[:, None]
+    total = np.zeros((SINE_AMPLITUDES.size, periods.size))
+    for record in {leg.record for leg in legs}:
+        energy, load = np.zeros(periods.size), np.zeros((periods.size, 2))
+        for leg in (leg for leg in legs if leg.record == record):
+            turn = 2 * np.pi * leg.angle_rad[:, None] / periods
+            white = leg.white(np.concatenate([np.cos(turn), np.sin(turn)], axis=1))
+            energy += 0.5 * np.sum(white**2, axis=0).reshape(2, -1).sum(axis=0)
+            load += (leg.residual @ white).reshape(2, -1).T
+        pull = amplitude * np.hypot(*load.T)
+        # The phase integrated: the mean of exp(pull cos φ) is the Bessel function I0.
+        total += np.log(ive(0, pull)) + pull - 0.5 * amplitude**2 * energy
+    best = periods[int(np.argmax(total.max(axis=0)))]
+    top = total.max()
+    return float(top + np.log(np.mean(np.exp(total - top)))), float(best)
+
+
+def _saw_columns(leg: FineLeg, period):
+    turn = 2 * np.pi * leg.way_nm / period
+    return [f(h * turn) / h for h in range(1, HARMONICS + 1) for f in (np.cos, np.sin)]
+
+
+def _jumps(legs) -> float:
+    """Log evidence of many small jumps in the direction of loading, evenly or unevenly spaced.
+
+    A jump is one spike of the whitened residual; jumps one way make its distribution skewed along most of every leg, which
+    neither Gaussian noise nor a few sharp places do. Skewness is taken piece by piece and clipped.
+    """
+    skew, variance = [], []
+    for leg in legs:
+        pieces = np.array_split(leg.residual * leg.direction, max(1, leg.residual.size // PIECE))
+        for piece in pieces:
+            centred = piece - piece.mean()
+            skew.append(np.clip(np.mean(centred**3) / np.mean(centred**2) ** 1.5, -1.5, 1.5))
+            variance.append(6.0 / piece.size)
+    z = np.sum(skew) / np.sqrt(np.sum(variance))
+    return float(0.5 * max(z, 0.0) ** 2 - 3.0)
+
+
+def _lines(setting, fitted):
+    """Log evidence of a line in the spectrum of the angle at full sampling rate, the same in all records, and its period [s].
+
+    An ordinate of the periodogram over the level of its neighbours is exponential under noise; over a line of unknown
+    amplitude its evidence is about exp(excess) over the number of frequencies tried.
+    """
+    frequencies, total = None, 0.0
+    for r, record in enumerate(setting.unit.records):
+        data = fitted.problem.records[r]
+        smooth = np.interp(record.time_s, data.blocks.mid_s, data.blocks.angle_rad)
+        ratio, frequency = _spectrum_ratio(record.time_s, record.angle_rad - smooth)
+        if frequencies is None:
+            frequencies = frequency
+        nearest = np.searchsorted(frequency, frequencies).clip(1, frequency.size - 2)
+        # The line may fall between the coarser ordinates of a shorter record.
+        excess = np.maximum.reduce([ratio[nearest - 1], ratio[nearest], ratio[nearest + 1]]) - 1.8
+        total = total + np.where((frequencies >= frequency[0]) & (frequencies <= frequency[-1]), excess, 0.0)
+    best = int(np.argmax(total))
+    records = len(setting.unit.records)
+    # The tail of a sum of several largest-of-three ordinates is longer than that of one.
+    tail = records * np.log(3.0) + (records - 1) * np.log(max(total[best], 1.0))
+    return float(total[best] - np.log(frequencies.size) - tail - 3.0), float(1 / frequencies[best])
+
+
+def _spectrum_ratio(time, residual):
+    """Periodogram over its running median, and frequencies [Hz]; the lowest two hundred ordinates are left out."""
+    step = float(np.median(np.diff(time)))
+    taper = np.hanning(residual.size)
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * taper)) ** 2
+    frequency = np.fft.rfftfreq(residual.size, step)
+    level = median_filter(power, 101, mode="nearest") / np.log(2.0)
+    keep = slice(min(200, power.size // 4), power.size - 10)
+    return power[keep] / np.maximum(level[keep], 1e-300), frequency[keep]
+
+
+def _saw_of_torque(setting, legs, periods):
+    """Log evidence of a saw-tooth of the torque, each leg with shape and phase of its own, and its period."""
+    total = np.zeros((len(AMPLITUDES), len(periods)))
+    for leg in legs:
+        raw = np.stack([c for p in periods for c in _saw_columns(leg, p)], axis=1)
+        white = leg.white(raw).reshape(raw.shape[0], len(periods), -1)
+        gram, load = np.einsum("npi,npj->pij", white, white), np.einsum("npi,n->pi", white, leg.residual)
+        for a, amplitude in enumerate(AMPLITUDES):
+            inner = np.eye(gram.shape[-1]) / (amplitude * setting.noise_rad) ** 2 + gram
+            gain = np.einsum("pi,pi->p", load, np.linalg.solve(inner, load[..., None])[..., 0])
+            spread = np.linalg.slogdet(inner)[1] + 2 * gram.shape[-1] * np.log(amplitude * setting.noise_rad)
+            total[a] += 0.5 * (gain - spread)
+    best = periods[int(np.argmax(total.max(axis=0)))]
+    top = total.max()
+    return float(top + np.log(np.mean(np.exp(total - top)))), float(best)

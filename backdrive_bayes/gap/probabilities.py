@@ -1,0 +1,96 @@
+"""From log evidences to probabilities over {none, effects, pairs, unknown}.
+
+Raw evidences are too sure of themselves, because every formula is approximate: they are divided by a temperature, and what the
+baseline's misfit and unexplained structure are like beforehand is a prior over their levels. Temperature and priors were set
+on simulated units of a virtual bench that shares no formula with the models (studies/diagnosis_calibration.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from backdrive_bayes.gap.candidates import Candidates
+from backdrive_bayes.gap.fast import Fast
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Temperatures of slow and fast evidences, and prior weights; misfit weights follow ``MISFIT_LEVELS``."""
+
+    temperature: float = 4.0
+    fast_temperature: float = 2.5
+    none: float = 0.3
+    single: float = 0.4
+    pair: float = 0.08
+    unknown: float = 0.22
+    fast: float = 0.15
+    misfit: tuple[float, ...] = (0.4, 0.35, 0.15, 0.07, 0.02, 0.01)
+    unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
+    beside_level: tuple[float, ...] = (0.0, 0.0, 0.0, 0.1, 0.1, 0.1)
+
+
+CALIBRATION = Calibration()
+NONE, UNKNOWN = (), ("unknown",)
+
+
+def probabilities(candidates: Candidates, fast: Fast, calibration: Calibration = CALIBRATION) -> dict[tuple[str, ...], float]:
+    """Probability of every set of effects, () for none and ("unknown",) for something not in the library; they sum to one."""
+    slow, quick = _slow(candidates, calibration), _fast(fast, calibration)
+    joint: dict[tuple[str, ...], float] = {}
+    for effects, p in slow.items():
+        for name, q in quick.items():
+            both = _union(effects, name)
+            joint[both] = joint.get(both, 0.0) + p * q
+    return joint
+
+
+def _union(effects, fast):
+    if fast == "vibration" or effects == UNKNOWN:
+        return UNKNOWN
+    return effects if fast is None or fast in effects else tuple(sorted((*effects, fast)))
+
+
+def _slow(candidates, c):
+    misfit = np.log(c.misfit)
+    singles = [w for w in candidates.weighed if len(w.effects) == 1]
+    possible = len(singles) * (len(singles) - 1) / 2
+    share = {0: c.none, 1: c.single / max(len(singles), 1), 2: c.pair / max(possible, 1)}
+    score = {w.effects: np.log(share[len(w.effects)]) + logsumexp(w.log_evidence + misfit) / c.temperature for w in candidates.weighed}
+    kinds = candidates.unexplained.shape[1]
+    with np.errstate(divide="ignore"):
+        levels = np.log([c.unknown_level, c.beside_level])[:, None, :]
+    total = logsumexp(candidates.unexplained + levels) - np.log(kinds)
+    score[UNKNOWN] = np.log(c.unknown) + total / c.temperature
+    return _normalised(score)
+
+
+def _fast(fast, c):
+    score = {None: np.log(1 - c.fast)}
+    for name, value in fast.log_evidence.items():
+        score[name] = np.log(c.fast / len(fast.log_evidence)) + min(value, 1e4) / c.fast_temperature
+    return _normalised(score)
+
+
+def _normalised(score):
+    total = logsumexp(list(score.values()))
+    return {k: float(np.exp(v - total)) for k, v in score.items()}
+
+
+def marginal(joint: dict[tuple[str, ...], float]) -> dict[str, float]:
+    """Probability by label: single names, 'a+b' for pairs, 'unknown', 'none'; highest first."""
+    named = {"+".join(k) if k else "none": p for k, p in joint.items()}
+    return dict(sorted(named.items(), key=lambda item: -item[1]))
+
+
+def credible_set(labels: dict[str, float], level: float = 0.9) -> list[str]:
+    """The fewest labels, most probable first, that hold ``level`` of the probability."""
+    chosen, total = [], 0.0
+    for label, p in sorted(labels.items(), key=lambda item: -item[1]):
+        chosen.append(label)
+        total += p
+        if total >= level:
+            break
+    return chosen

@@ -1,0 +1,70 @@
+"""From evidences to probabilities and credible sets."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from backdrive_bayes.gap.candidates import MISFIT_LEVELS, UNKNOWN_KINDS, UNKNOWN_LEVELS
+from backdrive_bayes.gap.fast import Fast
+from backdrive_bayes.gap.probabilities import CALIBRATION, credible_set, marginal, probabilities
+
+QUIET = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": -3.0}, {})
+LEVELS = -np.arange(len(MISFIT_LEVELS), dtype=float)
+
+
+def candidates(unexplained=-50.0, **gains):
+    """Hypotheses whose evidence beats the baseline's by the given gains; pairs are written a__b."""
+    weighed = [SimpleNamespace(effects=(), log_evidence=LEVELS)]
+    weighed += [SimpleNamespace(effects=tuple(k.split("__")), log_evidence=LEVELS + v) for k, v in gains.items()]
+    rest = np.full((2, len(UNKNOWN_KINDS), len(UNKNOWN_LEVELS)), unexplained)
+    return SimpleNamespace(weighed=tuple(weighed), none=weighed[0], unexplained=rest)
+
+
+def labels(found, fast=QUIET):
+    return marginal(probabilities(found, fast))
+
+
+def test_probabilities_sum_to_one_and_are_sorted():
+    found = labels(candidates(sensor_lag=3.0, thermal_drift=-2.0, sensor_lag__thermal_drift=4.0))
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert list(found.values()) == sorted(found.values(), reverse=True)
+
+
+def test_without_evidence_the_baseline_explains_all():
+    assert next(iter(labels(candidates(sensor_lag=-3.0, thermal_drift=-3.0)))) == "none"
+
+
+def test_a_strong_effect_is_named_and_a_stronger_rest_is_unknown():
+    named = labels(candidates(sensor_lag=100.0, thermal_drift=0.0))
+    assert named["sensor_lag"] > 0.9
+    rest = labels(candidates(sensor_lag=100.0, thermal_drift=0.0, unexplained=250.0))
+    assert rest["unknown"] > 0.9
+
+
+def test_a_pair_must_earn_its_place():
+    close = labels(candidates(sensor_lag=100.0, thermal_drift=0.0, sensor_lag__thermal_drift=103.0))
+    far = labels(candidates(sensor_lag=100.0, thermal_drift=0.0, sensor_lag__thermal_drift=200.0))
+    assert close["sensor_lag"] > close["sensor_lag+thermal_drift"]
+    assert far["sensor_lag+thermal_drift"] > 0.9
+
+
+def test_fast_structure_joins_the_slow_answer_and_vibration_is_unknown():
+    jumps = Fast({"encoder_error": -3.0, "stick_slip": 80.0, "vibration": -3.0}, {})
+    assert labels(candidates(sensor_lag=-3.0), jumps)["stick_slip"] > 0.5
+    assert labels(candidates(sensor_lag=100.0), jumps)["sensor_lag+stick_slip"] > 0.5
+    hum = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": 80.0}, {})
+    assert labels(candidates(sensor_lag=100.0), hum)["unknown"] > 0.9
+
+
+def test_credible_set_is_the_smallest_that_holds_the_level():
+    found = {"a": 0.6, "b": 0.25, "c": 0.1, "none": 0.05}
+    assert credible_set(found, 0.9) == ["a", "b", "c"]
+    assert credible_set(found, 0.5) == ["a"]
+
+
+def test_priors_are_a_distribution():
+    c = CALIBRATION
+    assert c.none + c.single + c.pair + c.unknown == pytest.approx(1.0)
+    assert len(c.misfit) == len(c.misfit) == len(MISFIT_LEVELS)
+    assert sum(c.misfit) == pytest.approx(1.0) and sum(c.unknown_level) == pytest.approx(1.0)
