@@ -30,7 +30,7 @@ from scipy.signal import lfilter
 from backdrive_bayes.indicators.summary import indicators_json, monitored
 from backdrive_bayes.inference.fit import fit, prepare
 from backdrive_bayes.inference.problem import path_of
-from backdrive_bayes.inference.sampling import Settings, run_ensembles, warm_up
+from backdrive_bayes.inference.sampling import Settings, begin_ensembles, run_ensembles, warm_up
 from backdrive_bayes.model.path import Leg, TorquePath
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.unit_folder import read_unit
@@ -58,8 +58,9 @@ def ours(problem, optimum, seconds=20.0):
     # Without thinning, so that nothing the sampler has drawn is thrown away.
     settings = Settings(kept_per_ensemble=10**6, refits=1)
     began = time.perf_counter()
+    chains = begin_ensembles(problem.log_posterior, proposal, rng, settings)
     drawn = run_ensembles(
-        problem.log_posterior, proposal, rng, settings, lambda e: False, lambda: began + seconds - time.perf_counter()
+        problem.log_posterior, chains, rng, settings, lambda e: False, lambda: began + seconds - time.perf_counter()
     )
     run = time.perf_counter() - began
     ess = min_ess(drawn.z)
@@ -136,7 +137,8 @@ def numpyro_nuts(problem, optimum, warm=500, draws=1000):
     potential = _jax_potential(problem)
     began = time.perf_counter()
     kernel = numpyro.infer.NUTS(potential_fn=potential, dense_mass=True)
-    mcmc = numpyro.infer.MCMC(kernel, num_warmup=warm, num_samples=draws, num_chains=2, progress_bar=False, chain_method="sequential")
+    options = {"num_chains": 2, "chain_method": "sequential", "progress_bar": False}
+    mcmc = numpyro.infer.MCMC(kernel, num_warmup=warm, num_samples=draws, **options)
     start = np.stack([optimum.z, optimum.z + 0.1 * np.sqrt(np.diag(optimum.covariance))])
     mcmc.run(jax.random.PRNGKey(0), init_params=jax.numpy.asarray(start))
     z = np.asarray(mcmc.get_samples(group_by_chain=True))
@@ -155,15 +157,15 @@ def _jax_potential(problem):
     from jax.scipy.stats import norm
 
     from backdrive_bayes.model.friction import CONSTANT_SHARES, LOAD_RATIOS, _bank
+    from backdrive_bayes.model.parameter import BoundedLogNormal, LogNormal, LogUniform, Uniform
 
-    data, t = problem.records[0], problem.transform
-    bank, rated = _bank(data.path, problem.model.scale.torque_nm), problem.model.scale.torque_nm
+    data, rated = problem.records[0], problem.model.scale.torque_nm
+    bank = _bank(data.path, rated, 0)
     names, path = [c.parameter.name for c in problem.coordinates], data.path
     padded = np.zeros((bank.past.shape[0], path.torque_nm.size))
     padded[:, : bank.past.shape[1]] = bank.past
     neutral, torque, direction = jnp.asarray(bank.neutral), jnp.asarray(path.torque_nm), jnp.asarray(path.direction)
-    floor, weight, sigma, lo, width = np.ones((5, len(names)))
-    floor[t.log], weight[t.log], sigma[t.log], lo[t.even], width[t.even] = t.floor, t.weight, t.sigma, t.lo, t.width
+    priors = [c.parameter.scaled_prior(problem.model.scale) for c in problem.coordinates]
 
     def hats(nodes, mean, spread):
         positive = jnp.asarray(nodes[1:])
@@ -193,17 +195,34 @@ def _jax_potential(problem):
 
         bound = rising(direction * torque) * direction
         low, high = rising(path.start_torque_nm), -rising(-path.start_torque_nm)
-        state, legs = low + 0.5 * (1 + v["initial_gap_position"]) * (high - low), []
-        for leg in path.legs:
-            hold = jnp.maximum if leg.direction > 0 else jnp.minimum
-            legs.append(hold(state, bound[leg.start : leg.stop]))
-            state = hold(state, rising(leg.direction * leg.end_torque_nm) * leg.direction)
-        return elastic + 0.5 * v["clearance"] * jnp.concatenate(legs)
+
+        def played(state):
+            legs = []
+            for leg in path.legs:
+                hold = jnp.maximum if leg.direction > 0 else jnp.minimum
+                legs.append(hold(state, bound[leg.start : leg.stop]))
+                state = hold(state, rising(leg.direction * leg.end_torque_nm) * leg.direction)
+            return jnp.concatenate(legs)
+
+        place, spread = 0.5 * (1 + v["initial_gap_position"]), v["initial_gap_spread"]
+        gap = (1 - spread) * played(low + place * (high - low)) + spread * ((1 - place) * played(low) + place * played(high))
+        return elastic + 0.5 * v["clearance"] * gap
+
+    def physical_value(prior, z):
+        match prior:
+            case Uniform(lo, hi):
+                return lo + (hi - lo) * norm.cdf(z)
+            case LogUniform(lo, hi):
+                return lo * (hi / lo) ** norm.cdf(z)
+            case BoundedLogNormal(median, sd, hi):
+                return hi / (1 + (hi / median - 1) * jnp.exp(-sd * z))
+            case LogNormal(median, sd):
+                return median * jnp.exp(sd * z)
 
     whitener, measured = jnp.asarray(data.whitener), jnp.asarray(data.blocks.angle_rad)
 
     def potential(z):
-        physical = jnp.where(t.log, 1 / (floor + weight * jnp.exp(-sigma * z)), lo + width * norm.cdf(z))
+        physical = [physical_value(prior, z[i]) for i, prior in enumerate(priors)]
         residual = whitener @ (measured - angle(dict(zip(names, physical, strict=True))))
         chi2 = jnp.maximum(residual @ residual - problem.misfit, 0.0)
         return 0.5 * (problem.noise_dof + problem.dof) * jnp.log1p(chi2 / problem.noise_dof) + 0.5 * z @ z
@@ -246,7 +265,8 @@ def evaluation_cost(problem):
     for _ in range(50):
         problem.log_posterior(z)
     ms = (time.perf_counter() - began) / 50 * 1e3
-    return {"blocks": problem.dof + 1, "ms_64_walkers": ms, "ms_per_thousand_blocks_and_walker": ms / 64 / (problem.dof + 1) * 1e3}
+    blocks = problem.dof + 1
+    return {"blocks": blocks, "ms_64_walkers": ms, "ms_per_thousand_blocks_and_walker": ms / 64 / blocks * 1e3}
 
 
 def main():

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.gap.evidence import log_evidence
-from backdrive_bayes.gap.hypotheses import Fitted, Flexible, fit_none, fit_screened, polished, screen
+from backdrive_bayes.gap.hypotheses import Fitted, Flexible, fit_none, fit_screened, polished, rebased, screen, simplified
 from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
 from backdrive_bayes.model.registry import candidates_beside
 
@@ -78,17 +78,28 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
         known, other = sorted(pair, key=lambda n: -max(_weigh(setting, singles[n]).log_evidence))
         found = screen(setting, singles[known], other, reference, rng, 128)
         weighed.append(_weigh(setting, fit_screened(found, pair)))
-    weighed = _polish_best(setting, weighed)
+    weighed = _polish_best(setting, weighed, rng)
     best = max(weighed[1 : len(names) + 1], key=lambda w: w.log_evidence.max(), default=weighed[0])
     unexplained = np.array([_unexplained(setting, fitted) for fitted in (none, best.fitted)])
     return Candidates(tuple(weighed), unexplained)
 
 
-def _polish_best(setting, weighed):
-    """The few most probable hypotheses, and the baseline, climbed to the end."""
-    order = sorted(range(len(weighed)), key=lambda i: -weighed[i].log_evidence.max())
-    again = {0, *order[:POLISHED]}
-    return [_better(w, _weigh(setting, polished(w.fitted))) if i in again else w for i, w in enumerate(weighed)]
+def _polish_best(setting, weighed, rng):
+    """The few most probable hypotheses, and the baseline, climbed to the end; what they hold begun anew from their modes."""
+    table = {w.effects: w for w in weighed}
+    order = sorted(table, key=lambda e: -table[e].log_evidence.max())
+    for effects in {(): None, **dict.fromkeys(order[:POLISHED])}:
+        table[effects] = _better(table[effects], _weigh(setting, polished(table[effects].fitted, rng)))
+    best = max(table.values(), key=lambda w: w.log_evidence.max())
+    done = {(), best.effects, *order[:POLISHED]}
+    for effects in (e for e in table if e not in done):
+        table[effects] = _better(table[effects], _weigh(setting, rebased(table[effects].fitted, best.fitted)))
+    best = max(table.values(), key=lambda w: w.log_evidence.max())
+    parts = [effects for effects in table if len(effects) < len(best.effects) and set(effects) <= set(best.effects)]
+    for effects in parts:
+        simpler = simplified(setting, best.fitted, effects, setting.whitening(REFERENCE))
+        table[effects] = _better(table[effects], _weigh(setting, simpler))
+    return [table[w.effects] for w in weighed]
 
 
 def _better(one, other):

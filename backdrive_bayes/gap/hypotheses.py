@@ -8,6 +8,7 @@ import numpy as np
 
 from backdrive_bayes.gap.setting import JointProblem, Setting, Whitening
 from backdrive_bayes.inference.optimum import find_optimum
+from backdrive_bayes.inference.starts import FEATURE_STARTS, feature_starts
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import members_named
 
@@ -38,9 +39,9 @@ def joint_problem(setting: Setting, effects, whitening: Whitening) -> JointProbl
     return JointProblem(model, base.records, 0.0, whitener=whitening.matrix)
 
 
-def fit_from(problem: JointProblem, effects, starts, max_steps: int = 14) -> Fitted:
+def fit_from(problem: JointProblem, effects, starts, max_steps: int = 10) -> Fitted:
     """The best mode reached from ``starts`` (starts, dimension)."""
-    z = find_optimum(problem, starts, max_steps, first_steps=6, finalists=1).z
+    z = find_optimum(problem, starts, max_steps, first_steps=5, finalists=1).z
     return linearised(problem, effects, z)
 
 
@@ -145,6 +146,36 @@ def fit_screened(found: Screen, effects) -> Fitted:
     return fit_from(found.problem, effects, found.starts)
 
 
-def polished(fitted: Fitted) -> Fitted:
-    """The same hypothesis climbed further."""
-    return fit_from(fitted.problem, fitted.effects, [fitted.z], 30)
+def rebased(fitted: Fitted, other: Fitted) -> Fitted:
+    """The same hypothesis begun anew with the baseline's parameters of another mode."""
+    z = fitted.z.copy()
+    for i, label in enumerate(fitted.problem.labels):
+        if label in other.problem.labels:
+            z[i] = other.z[other.problem.labels.index(label)]
+    return fit_from(fitted.problem, fitted.effects, [z], 12)
+
+
+def simplified(setting: Setting, fitted: Fitted, effects, whitening: Whitening) -> Fitted:
+    """A simpler hypothesis begun from the mode of one that holds it, which may have found a better baseline."""
+    problem = joint_problem(setting, effects, whitening)
+    start = fitted.z[[fitted.problem.labels.index(label) for label in problem.labels]]
+    return fit_from(problem, effects, [start], 20)
+
+
+def polished(fitted: Fitted, rng) -> Fitted:
+    """The same hypothesis climbed to the end, also from what the loops look like without the effects' contributions.
+
+    The baseline's mode may have been a makeshift for the effect that was missing.
+    """
+    problem, change, row, records = fitted.problem, sum(fitted.contributions, 0.0), 0, []
+    for data in problem.records:
+        own = slice(row, row + data.blocks.count.size)
+        angle = data.blocks.angle_rad - (change[own] if fitted.effects else 0.0)
+        records.append(replace(data, blocks=replace(data.blocks, angle_rad=angle)))
+        row = own.stop
+    model = replace(problem.model, members=tuple(m for m in problem.model.members if m.name not in fitted.effects))
+    cleaned = replace(problem, model=model, records=tuple(records))
+    starts = np.repeat(fitted.z[None], FEATURE_STARTS + 1, axis=0)
+    known = [problem.labels.index(label) for label in cleaned.labels]
+    starts[1:, known] = feature_starts(cleaned, rng)
+    return fit_from(problem, fitted.effects, starts, 30)

@@ -9,6 +9,8 @@ import numpy as np
 from backdrive_bayes.inference.problem import Problem
 
 GRID = 400
+HARDENING_RATIOS, RELEASE_SHARES = (1.0, 0.5), (0.05, 0.25)
+FEATURE_STARTS = len(HARDENING_RATIOS) * len(RELEASE_SHARES)
 
 
 def screened_starts(problem: Problem, rng, candidates: int = 1024, keep: int = 8) -> np.ndarray:
@@ -24,7 +26,7 @@ def feature_starts(problem: Problem, rng) -> np.ndarray:
     Prior draws alone rarely hit narrow modes; parameters of members that the model does not have are left out.
     """
     starts = []
-    for ratio, share in itertools.product((1.0, 0.5), (0.05, 0.25)):
+    for ratio, share in itertools.product(HARDENING_RATIOS, RELEASE_SHARES):
         guess = _features(problem) | {"hardening_ratio": ratio, "release_share": share}
         z = np.zeros(problem.dimension)
         for i, c in enumerate(problem.coordinates):

@@ -11,7 +11,7 @@ from backdrive_bayes.model.parameter import Normal, Parameter
 WARM_UP = "weakly informative: some per cent of the peak angle over a record"
 
 
-TERMS = {"drift": 0.02, "drift_bend": 0.01, "drift_twist": 0.006, "drift_wave": 0.004, "drift_ripple": 0.003}
+TERMS = {"drift": 0.02, "drift_bend": 0.008, "drift_twist": 0.004, "drift_wave": 0.002, "drift_ripple": 0.001}
 """Legendre coefficients of degree 1 to 5 and their prior standard deviations in the angle scale."""
 
 

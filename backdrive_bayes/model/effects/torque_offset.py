@@ -14,7 +14,8 @@ class TorqueOffset:
     signature = "the whole loop is shifted along the torque axis"
     source = "zero error of strain-gauge torque sensors; weight of an unbalanced lever"
     parameters = (
-        Parameter("torque_offset", "N·m", "torque", Normal(0.05), 0.0, "weakly informative: some per cent of full scale"),
+        # A sensor's zero may be set anew for every record.
+        Parameter("torque_offset", "N·m", "torque", Normal(0.03), 0.0, "weakly informative: some per cent of full scale", True),
     )
 
     def respond(self, values, drive):
