@@ -10,6 +10,7 @@ export MPLBACKEND := Agg
 
 demo: $(VENV)/ready
 	$(BIN)/backdrive-bayes demo
+	cp reports/demo/reducer-1/figures/loop-2.png reports/demo/loop.png
 
 test: $(VENV)/ready
 	$(BIN)/python -m pytest

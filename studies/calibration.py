@@ -89,7 +89,8 @@ def place(truth, draws, noise_factor=1.0):
     draws = np.median(draws) + noise_factor * (draws - np.median(draws))
     lo, hi = np.quantile(draws, [0.05, 0.95])
     thin = draws[np.linspace(0, draws.size - 1, RANKS).astype(int)]
-    return {"rank": int((thin < truth).sum()), "covered": bool(lo <= truth <= hi), "z": float((truth - draws.mean()) / (draws.std() + 1e-300))}
+    z = float((truth - draws.mean()) / (draws.std() + 1e-300))
+    return {"rank": int((thin < truth).sum()), "covered": bool(lo <= truth <= hi), "z": z}
 
 
 def summarise(results) -> dict:
@@ -147,7 +148,8 @@ def main():
         for result in pool.map(one_unit, seeds):
             results.append(result)
             bad = [k for k, v in result["quantities"].items() if abs(v["z"]) > 3.5]
-            print(f"unit {result['seed']}: converged {result['converged']}, {result['seconds']:.1f} s, far off: {bad}", flush=True)
+            told = f"converged {result['converged']}, {result['seconds']:.1f} s, far off: {bad}"
+            print(f"unit {result['seed']}: {told}", flush=True)
     summary = summarise(results)
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "calibration.json").write_text(json.dumps(summary | {"runs": results}, indent=1))

@@ -81,9 +81,10 @@ def _predict_small(unit, posterior, path):
 def trends(results) -> list[dict]:
     """Probability that a parameter rises or falls from each preload to the next, from independent posteriors."""
     by_name, rows = {r["unit"]: r for r in results}, []
-    for family in (("conic-preload-1", "conic-preload-2", "conic-preload-4"), ("split-preload-0", "split-preload-1", "split-preload-2")):
+    for kind, preloads in (("conic", (1, 2, 4)), ("split", (0, 1, 2))):
+        family = [f"{kind}-preload-{p}" for p in preloads]
         for low, high in (family[:2], family[1:], family[::2]):
-            if not (low in by_name and high in by_name and by_name[low]["all"]["converged"] and by_name[high]["all"]["converged"]):
+            if not all(name in by_name and by_name[name]["all"]["converged"] for name in (low, high)):
                 rows.append({"from": low, "to": high, "inconclusive": "one of the two has not converged"})
                 continue
             row = {"from": low, "to": high}

@@ -56,7 +56,8 @@ def main():
     options = parser.parse_args()
     rows = []
     for name in ANSWERS:
-        posterior = fit(read_unit(options.data / name), seed=1, quantities=monitored(0.03), settings=Settings(max_seconds=options.budget))
+        settings = Settings(max_seconds=options.budget)
+        posterior = fit(read_unit(options.data / name), seed=1, quantities=monitored(0.03), settings=settings)
         result = indicators_json(posterior, 0.03)
         for record in result["records"]:
             for indicator, truth, factor in expected(name, record):
@@ -64,7 +65,8 @@ def main():
                 lo, median, hi = (v[k] / factor for k in ("lo", "median", "hi"))
                 rows.append({"unit": name, "record": record["file"], "indicator": indicator, "truth": truth, "median": median,
                              "lo90": lo, "hi90": hi, "covered": bool(lo <= truth <= hi), "converged": posterior.converged})
-                print(f"{name} {record['file']:28s} {indicator:22s} truth {truth:8.3f}  {median:8.3f} [{lo:.3f}, {hi:.3f}] {'' if lo <= truth <= hi else 'MISSED'}", flush=True)
+                found = f"{median:8.3f} [{lo:.3f}, {hi:.3f}] {'' if lo <= truth <= hi else 'MISSED'}"
+                print(f"{name} {record['file']:28s} {indicator:22s} truth {truth:8.3f}  {found}", flush=True)
     share = float(np.mean([r["covered"] for r in rows]))
     print(f"covered {share:.2f} of {len(rows)}")
     options.out.mkdir(parents=True, exist_ok=True)

@@ -30,7 +30,8 @@ def run(args) -> int:
         folder = out / name
         check.run(Namespace(unit=args.data / name, out=folder, seed=args.seed))
         defaults = {"baseline": "geometric,elastic,friction", "k": 0.03, "level": 0.9, "budget": 300.0}
-        codes.append(fit.run(Namespace(unit=args.data / name, out=folder, seed=args.seed, no_figures=False, **defaults)))
+        defaults |= {"resume": False, "no_figures": False}
+        codes.append(fit.run(Namespace(unit=args.data / name, out=folder, seed=args.seed, **defaults)))
         results.append(folder)
     report.run(Namespace(results=results, out=out, seed=args.seed))
     return max(codes)

@@ -14,6 +14,8 @@ VERBS = {
     "check": "check",
     "fit": "fit",
     "predict": "predict",
+    "simulate": "simulate",
+    "blind": "blind",
     "report": "report",
     "demo": "demo",
 }

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.figures import amplitude, corner_plot, loop, modules, predictive, torque_energy, trace
+from backdrive_bayes.figures import amplitude, corner_plot, diagnosis, loop, modules, predictive, torque_energy, trace
+from backdrive_bayes.figures.diagnosis_saved import FILE as DIAGNOSIS
+from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import PER_FIGURE, SERIES, Figure, styled
 
@@ -16,6 +18,7 @@ CAPTIONS = {
     "corner": corner_plot.CAPTION,
     "trace": trace.CAPTION,
     "predictive": predictive.CAPTION,
+    **diagnosis.CAPTIONS,
 }
 PNG_DPI = 150
 
@@ -26,8 +29,11 @@ def caption(name: str) -> str:
 
 
 def all_figures(folder: Path) -> dict[str, Figure]:
-    """Every figure of one result folder of ``fit`` by name: loop, loop-2, … predictive."""
-    return figures_of(Saved.read(folder))
+    """Every figure of one result folder of ``fit`` or ``diagnose`` by name: loop, loop-2, … predictive, diagnosis …"""
+    diagnosed = (Path(folder) / DIAGNOSIS).exists()
+    fitted = (Path(folder) / "indicators.json").exists() or not diagnosed
+    out = figures_of(Saved.read(folder)) if fitted else {}
+    return out | (diagnosis.figures_of(Diagnosed.read(folder)) if diagnosed else {})
 
 
 def figures_of(saved: Saved) -> dict[str, Figure]:

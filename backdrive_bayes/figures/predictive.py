@@ -20,7 +20,10 @@ CAPTION = (
     "Posterior predictive check. Left: distribution of the measured blocks' ranks among replicated blocks, "
     "as difference from an even spread; the band holds the same curve of the replicates themselves. Middle "
     "and right: two summaries of the measured record (line) among those of the replicates (histogram); the "
-    "rms step of the residual from block to block tests the noise level."
+    "rms step of the residual from block to block tests the noise level. Replicates are wider than the "
+    "measurement: the model error follows the measured record and takes part of its noise along, while each "
+    "replicate has fresh noise and the model error's own uncertainty. Ranks then crowd in the middle (the "
+    "curve falls, then rises) and the line lies left of the histogram: cautious. The opposite means misfit."
 )
 POINTS = 101
 
@@ -28,13 +31,14 @@ POINTS = 101
 def draw(saved: Saved, records: list[int]):
     """One row a record: rank distribution, angle range and rms step of the residual [arcmin]."""
     with styled():
-        figure = new_figure(0.7 + 1.1 * len(records))
+        figure = new_figure(0.7 + 1.3 * len(records))
         axes = figure.subplots(len(records), 3, squeeze=False)
         labels = record_labels(saved.records)
         for row, record in zip(axes, records, strict=True):
             blocks = record_blocks(saved, record)
             _ecdf(row[0], blocks, saved.indicators["level"])
-            row[0].set_ylabel(f"{labels[record]}\nΔ share")
+            row[0].set_ylabel("Δ share")
+            row[1].set_title(labels[record])
             replicates = blocks.replicates_rad
             _summary(row[1], np.ptp(replicates, axis=1), np.ptp(blocks.angle_rad))
             _summary(row[2], _roughness(replicates, blocks), _roughness(blocks.angle_rad, blocks))

@@ -2,29 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.errors import BadInput
-
-INDICATORS = "backdrive-bayes/indicators/1"
-
-
-def read_result(path: Path, schema: str) -> dict:
-    """A result file's object; BadInput where it is missing, no JSON or of another schema."""
-    try:
-        loaded = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadInput(path, "a result file", "no such file") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BadInput(path, "a JSON result file", f"unreadable file ({type(error).__name__})") from None
-    found = loaded.get("schema") if isinstance(loaded, dict) else None
-    if found != schema:
-        raise BadInput(path, f"schema '{schema}'", repr(found))
-    return loaded
+from backdrive_bayes.results import INDICATORS, read_group, read_result
 
 
 @dataclass(eq=False)
@@ -51,8 +34,6 @@ class Saved:
 
     def group(self, name: str):
         """A group of the posterior file as an xarray dataset, read once."""
-        from backdrive_bayes.inference.posterior_file import read_group
-
         if name not in self._groups:
             self._groups[name] = read_group(self.posterior_file, name)
         return self._groups[name]

@@ -40,7 +40,8 @@ def monitored(k: float):
     def quantities(problem: Problem, discrepancy: Discrepancy, z, weights):
         named = {}
         for r, data in enumerate(problem.records):
-            for name, value in core_indicators(reducer_loops(problem, discrepancy, z, weights, r, k), k * _rated(problem)).items():
+            loops = reducer_loops(problem, discrepancy, z, weights, r, k)
+            for name, value in core_indicators(loops, k * _rated(problem)).items():
                 named[f"{name} of {data.blocks.name}"] = value
         return named
 
@@ -90,7 +91,7 @@ def _model_error_json(posterior):
         "scale_rad": d.scale_rad,
         "length_loops": d.length,
         "log_evidence_gain": d.gain,
-        "note": "Indicators are of model plus discrepancy; model_error_share is the part of an interval's squared width due to it.",
+        "note": "Indicators are of model plus discrepancy; model_error_share: part of an interval's squared width due to it.",
     }
 
 

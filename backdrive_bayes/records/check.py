@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from backdrive_bayes.records.branches import find_branches, find_segments
-from backdrive_bayes.records.faults import count_wild, find_gaps, find_plateaus, longest_frozen, quantum
+from backdrive_bayes.records.faults import find_gaps, find_plateaus, find_wild, longest_frozen, quantum
 from backdrive_bayes.records.messages import record_messages, unit_messages
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.shape import closure, cycle_count, extremes, loading_rate
@@ -59,7 +59,7 @@ def check_record(record: Record, rated_torque_nm: float) -> dict:
         "duration_s": float(time[-1] - time[0]),
         "sampling": _sampling(time),
         "gaps": find_gaps(time, torque),
-        "drop_outs": {"torque": count_wild(torque), "angle": count_wild(angle)},
+        "drop_outs": {"torque": int(find_wild(torque).sum()), "angle": int(find_wild(angle).sum())},
         "plateaus": find_plateaus(time, torque, low, high),
         "frozen": {"torque": longest_frozen(torque, angle), "angle": longest_frozen(angle, torque)},
         "angle_quantum_rad": quantum(angle),

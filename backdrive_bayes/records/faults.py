@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.ndimage import median_filter
 
+from backdrive_bayes.records.record import Record, Unit
+
+SPOILING_SHARE = 0.1
+"""Of a channel's range: an isolated sample further off than that is left out before inference."""
 _GAP_STEPS = 5.0
 _WILD_SD = 12.0
 _PLATEAU_TIMES = 4.0  # a triangle spends 5 % of its time in the top 5 %; so many times that is no triangle
@@ -29,13 +35,33 @@ def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:
     ]
 
 
-def count_wild(values: np.ndarray) -> int:
-    """Number of isolated samples (drop-outs, spikes) far from the running median of five."""
+def find_wild(values: np.ndarray, least_share: float = 0.02) -> np.ndarray:
+    """Where isolated samples (drop-outs, spikes) lie far from the running median of five, shape (samples,).
+
+    ``least_share`` of the channel's range is the least that counts as far.
+    """
     if len(values) < 5:
-        return 0
-    off = np.abs(values - median_filter(values, 5, mode="nearest"))
+        return np.zeros(len(values), bool)
+    median = median_filter(values, 5, mode="nearest")
+    off = np.abs(values - median)
     usual = 1.4826 * float(np.median(off[off > 0.0])) if np.any(off > 0.0) else 0.0
-    return int(np.count_nonzero(off > max(_WILD_SD * usual, 0.02 * float(np.ptp(values)))))
+    # The range is that of the medians: one spike would hide others.
+    return off > max(_WILD_SD * usual, least_share * float(np.ptp(median)))
+
+
+def without_wild(unit: Unit) -> Unit:
+    """The unit less the samples of which either channel is wild enough to spoil means, with notes that say so."""
+    return replace(unit, records=tuple(_without_wild(r) for r in unit.records))
+
+
+def _without_wild(record: Record) -> Record:
+    wild = find_wild(record.torque_nm, SPOILING_SHARE) | find_wild(record.angle_rad, SPOILING_SHARE)
+    count = int(wild.sum())
+    if not count:
+        return record
+    note = f"{count} isolated sample{'s'[: count != 1]} far from the neighbours left out"
+    kept = {name: getattr(record, name)[~wild] for name in ("time_s", "torque_nm", "angle_rad")}
+    return replace(record, **kept, notes=(*record.notes, note))
 
 
 def find_plateaus(time_s: np.ndarray, torque_nm: np.ndarray, low: float, high: float) -> list[dict]:
@@ -55,8 +81,8 @@ def longest_frozen(values: np.ndarray, other: np.ndarray) -> dict:
     edges = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]))
     run = int(np.argmax(np.diff(edges)))
     start, stop = int(edges[run]), int(edges[run + 1])
-    tip = max(1, (stop - start) // 20)
-    moved = abs(float(np.mean(other[stop - tip : stop]) - np.mean(other[start : start + tip])))
+    means = [part.mean() for part in np.array_split(other[start:stop], min(20, stop - start))]
+    moved = float(np.ptp(means))
     span = float(np.ptp(other))
     return {"start": start, "samples": stop - start, "other_share": moved / span if span > 0.0 else 0.0}
 

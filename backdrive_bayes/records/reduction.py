@@ -20,8 +20,8 @@ from backdrive_bayes.records.record import Record
 class Blocks:
     """Block means of one record, all arrays of shape (blocks,).
 
-    ``torque_nm`` is the smooth torque path at the block, ``torque_variance_nm2`` what is left of the torque channel's noise in it;
-    ``begin_s`` and ``end_s`` bound the block in time, ``count`` is its number of samples. ``leg`` numbers the
+    ``torque_nm`` is the smooth torque path at the block, ``torque_variance_nm2`` what is left of the torque channel's noise
+    in it; ``begin_s`` and ``end_s`` bound the block in time, ``count`` is its number of samples. ``leg`` numbers the
     monotone legs, ``turning_nm`` (shape (legs + 1,)) are the torques at their ends, ``direction`` (legs,) is ±1.
     ``bend_rad`` is what has been taken off the mean angle for the curve's bend within the block.
     """

@@ -9,6 +9,7 @@ import numpy as np
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.clock import strictly_rising
+from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild
 from backdrive_bayes.records.plausible import check_plausible
 from backdrive_bayes.records.quantities import find_column
 from backdrive_bayes.records.readers import READERS, read_columns, record_suffix
@@ -54,7 +55,7 @@ def _read_bare(path: Path) -> Unit:
     if suffix is None:
         raise BadInput(path, f"a unit folder or a file ending in {', '.join(READERS)}", f"'{path.name}'")
     record = _read_record(RecordEntry(path, path.name), None)
-    rated = float(np.abs(record.torque_nm).max())
+    rated = float(np.abs(record.torque_nm[~find_wild(record.torque_nm, SPOILING_SHARE)]).max())
     note = f"no rated torque given: T_r taken as the largest torque, {rated:.4g} N·m"
     return Unit(
         path.name[: -len(suffix)] or path.name, rated, (record,), notes=(note,), data_hash=_hash([path])

@@ -32,7 +32,7 @@ def hurried(unit):
 
 @pytest.fixture(scope="module")
 def patient(unit):
-    return fit(unit, seed=1, settings=Settings(max_seconds=60.0), scale=SCALE, quantities=monitored(K))
+    return fit(unit, seed=1, settings=Settings(max_seconds=300.0), scale=SCALE, quantities=monitored(K))
 
 
 def test_same_seed_same_posterior_bit_for_bit(unit, hurried):

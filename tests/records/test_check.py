@@ -5,6 +5,7 @@ import pytest
 from conftest import answer, ramps
 
 from backdrive_bayes.records.check import check_unit
+from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Record, Unit
 
 ARCMIN = np.pi / 10800
@@ -96,3 +97,23 @@ def test_overload_offset_and_uneven_sampling_are_said():
     assert "above the rated" in texts(result, "warning")
     assert "off centre" in texts(result, "warning")
     assert "sampling is uneven" in texts(result, "info")
+
+
+def test_angle_clipped_over_a_tip_speaks_against_inference():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    result, _ = judged(time, torque, np.minimum(angle, 0.5 * angle.max()), noise=0.0)
+    assert not result["may_infer"] and "angle stands still" in result["reason"]
+
+
+def test_spikes_are_left_out_with_a_note_and_nothing_else_is():
+    time, torque = ramps(noise=0.002)
+    clean = Record("r.csv", time, torque, answer(torque))
+    torque = torque.copy()
+    torque[[150, 700]] = 1e9, 3.0
+    spiky = Record("r.csv", time, torque, answer(clean.torque_nm), notes=("said before",))
+    first, second = without_wild(Unit("u", 1.0, (spiky, clean))).records
+    assert second is clean
+    np.testing.assert_array_equal(first.torque_nm, np.delete(torque, [150, 700]))
+    np.testing.assert_array_equal(first.time_s, np.delete(time, [150, 700]))
+    assert first.notes == ("said before", "2 isolated samples far from the neighbours left out")

@@ -82,6 +82,14 @@ def test_bare_file_takes_its_largest_torque_and_says_so(unit_folder):
     assert "largest torque" in unit.notes[0]
 
 
+def test_largest_torque_of_a_bare_file_is_no_spike(unit_folder):
+    lines = (unit_folder / "a.csv").read_text().splitlines()
+    time, _, angle = lines[500].split(",")
+    lines[500] = f"{time},1e9,{angle}"
+    (unit_folder / "a.csv").write_text("\n".join(lines))
+    assert read_unit(unit_folder / "a.csv").rated_torque_nm < 1.1
+
+
 def test_unit_file_is_read_whole(unit_folder):
     toml = unit_folder / "unit.toml"
     head = 'serial = "#7"\ntest_date = 2024-05-06\nreduction_ratio = 64\nlimits = [1, 2]\n'

@@ -1,0 +1,87 @@
+"""The answers of a diagnosis, as a blind check reads them from files."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from backdrive_bayes.blind.key import label_of
+from backdrive_bayes.results import read_result
+
+ANSWER_SCHEMA = "backdrive-bayes/blind-answer/1"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a diagnosis says of one unit; ``label`` is None where it failed or was inconclusive, with the reason in ``error``.
+
+    ``probabilities`` and ``credible`` go by the labels of :func:`label_of`; ``gap`` is the probability of a gap; ``cells`` are
+    the objects of where.map; ``closed`` is the median closed fraction.
+    """
+
+    label: str | None
+    error: str | None = None
+    probabilities: dict[str, float] | None = None
+    credible: tuple[str, ...] = ()
+    gap: float | None = None
+    cells: tuple[dict, ...] = ()
+    closed: float | None = None
+    seconds: float | None = None
+
+    @property
+    def top(self) -> str | None:
+        """The most probable label."""
+        return max(self.probabilities, key=self.probabilities.get) if self.probabilities else None
+
+
+def read_answer(path: Path) -> Answer:
+    """An answer's file; one that cannot be understood is an answer that failed."""
+    kept = read_result(path, ANSWER_SCHEMA)
+    if "diagnosis" not in kept:
+        return Answer(None, kept.get("error") or "no answer", seconds=kept.get("seconds"))
+    return understand(kept["diagnosis"], kept.get("seconds"))
+
+
+def understand(diagnosis: dict, seconds: float | None = None) -> Answer:
+    """The object of diagnosis.json as an :class:`Answer`."""
+    try:
+        reason = diagnosis.get("inconclusive")
+        if reason:
+            return Answer(None, f"inconclusive: {reason}", seconds=seconds)
+        probabilities = _probabilities(diagnosis["which"])
+        answer, where, shrink = diagnosis["answer"], diagnosis.get("where") or {}, diagnosis.get("shrink") or {}
+        return Answer(
+            label_of(answer["effects"]),
+            None,
+            probabilities,
+            tuple(canonical(item) for item in answer["credible_set_90"]),
+            _number(diagnosis["gap"]["probability"]),
+            tuple(where.get("map") or ()),
+            _number((shrink.get("closed_fraction") or {}).get("median")),
+            seconds,
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        return Answer(None, f"not a diagnosis: {type(error).__name__} {error}", seconds=seconds)
+
+
+def canonical(item) -> str:
+    """The label of a name, of names joined by '+', or of a list of names."""
+    names = item.split("+") if isinstance(item, str) else item
+    return label_of(name.strip() for name in names)
+
+
+def _probabilities(which):
+    found: dict[str, float] = {}
+    for entry in which:
+        label, p = canonical(entry["effect"]), float(entry["probability"])
+        if not 0.0 <= p <= 1.0 + 1e-6:
+            raise ValueError(f"probability {p} of {label}")
+        found[label] = found.get(label, 0.0) + p
+    if abs(sum(found.values()) - 1.0) > 0.01:
+        raise ValueError(f"probabilities that sum to {sum(found.values()):.3g}")
+    return found
+
+
+def _number(value):
+    return float(value) if value is not None and math.isfinite(value) else None

@@ -1,0 +1,62 @@
+"""What keeps a blind check blind: the key's hash comes first, the key last, and nothing in between tells the truth."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from backdrive_bayes.bench.registry import EFFECTS, UNLISTED
+from backdrive_bayes.blind.key import folder_digest
+from backdrive_bayes.errors import BadInput
+
+HASH, KEY, UNITS, ANSWERS = "key.sha256", Path("key") / "key.json", "units", "answers"
+_TELLING = re.compile("|".join((*EFFECTS, *UNLISTED, "truth", "severity", "planted")), re.IGNORECASE)
+_UNIT_FILES = re.compile(r"unit\.toml|\d+-rate-[^/]*\.csv\.gz")
+
+
+def publish(out: Path, sha256: str) -> None:
+    """Write the key's hash before any diagnosis; BadInput where another one, or an answer, was there first."""
+    path = Path(out) / HASH
+    if not path.exists() and any((Path(out) / ANSWERS).rglob("*.json")):
+        raise BadInput(path, "the key's hash before the first answer", "answers without one: take a new OUT")
+    if not path.exists():
+        path.write_text(f"{sha256}  {KEY.as_posix()}\n", encoding="ascii")
+    elif published(out) != sha256:
+        raise BadInput(path, "the hash of the units that these options and this seed give", "another one: take a new OUT")
+
+
+def published(out: Path) -> str:
+    """The published hash of the key."""
+    return (Path(out) / HASH).read_text(encoding="ascii").split()[0]
+
+
+def refuse_leaks(out: Path) -> None:
+    """Raise BadInput when a diagnosis that looks around in OUT could learn the truth."""
+    leaks = find_leaks(out)
+    if leaks:
+        raise BadInput(out, "a folder that does not tell the truth before it is diagnosed", "; ".join(leaks[:3]))
+
+
+def find_leaks(out: Path) -> list[str]:
+    """Files of OUT that tell, or could tell, what the key holds, in words; [] where it is sealed.
+
+    Answers are left out: they are what the diagnosis says itself.
+    """
+    out, found = Path(out), []
+    for path in sorted(p for p in out.rglob("*") if p.is_file()):
+        place = path.relative_to(out)
+        if place.parts[0] == ANSWERS or place.as_posix() == HASH:
+            continue
+        if place.parts[0] != UNITS or not _UNIT_FILES.fullmatch(path.name):
+            found.append(f"{place} should not be there")
+        elif path.suffix == ".toml" and (word := _TELLING.search(path.read_text(encoding="utf-8"))):
+            found.append(f"{place} says '{word.group()}'")
+    return found
+
+
+def refuse_changed(out: Path, entries) -> None:
+    """Raise BadInput when a unit's folder is not the one that the key was made for."""
+    for entry in entries:
+        folder = Path(out) / UNITS / entry["unit"]
+        if folder_digest(folder) != entry["folder_sha256"]:
+            raise BadInput(folder, "the files that were drawn", "changed ones")

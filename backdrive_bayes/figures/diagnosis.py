@@ -1,0 +1,121 @@
+"""A diagnosis at a glance, and all its figures."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+
+from backdrive_bayes.figures import diagnosis_closed, diagnosis_map, diagnosis_residual, diagnosis_shift
+from backdrive_bayes.figures.diagnosis_saved import Diagnosed
+from backdrive_bayes.figures.diagnosis_which import bar_lines, draw_bars
+from backdrive_bayes.figures.diagnosis_words import answer_words, drawable
+from backdrive_bayes.figures.style import PER_FIGURE, Figure, new_figure, styled
+
+CAPTION = (
+    "The diagnosis at a glance. Left: probability of each cause. Right: rms of the gap on held-out data before "
+    "and after the effect is added, and the fraction closed. Beneath: where the baseline misses the measurement "
+    "(+: measured angle larger than modelled); with many records, those that hold most of the gap."
+)
+CAPTIONS = {
+    "diagnosis": CAPTION,
+    "gap-map": diagnosis_map.CAPTION,
+    "gap-residual": diagnosis_residual.CAPTION,
+    "closed-fraction": diagnosis_closed.CAPTION,
+    "parameter-shift": diagnosis_shift.CAPTION,
+}
+ROW_IN = (0.19, 0.14)
+"""Height of a row of the map at a glance and of a stripe in it, at least [inch]."""
+MAP_IN = 2.3
+"""Height of the map at a glance, at most [inch]."""
+_LINE = 104
+
+
+def figures_of(saved: Diagnosed) -> dict[str, Figure]:
+    """Every figure that the saved parts allow, by name."""
+    everything = list(range(len(saved.records)))
+    out = {"diagnosis": draw(saved)} if saved.result["which"] or saved.cells else {}
+    if saved.cells:
+        row_in = diagnosis_map.row_height_in(saved, *diagnosis_map.ROW_IN)
+        at_most = diagnosis_map.fitting(diagnosis_map.MAP_IN, row_in)
+        out |= _split("gap-map", diagnosis_map, saved, everything, at_most)
+    out |= _split("gap-residual", diagnosis_residual, saved, sorted(diagnosis_residual.by_record(saved)), PER_FIGURE)
+    if saved.shrink:
+        out |= _split("closed-fraction", diagnosis_closed, saved, everything, diagnosis_closed.AT_MOST)
+    if saved.shifts:
+        out["parameter-shift"] = diagnosis_shift.draw(saved)
+    return out
+
+
+def _split(name, kind, saved, records, at_most):
+    """Figures of nearly equal numbers of records."""
+    if not records:
+        return {}
+    size = math.ceil(len(records) / math.ceil(len(records) / at_most))
+    parts = [records[i : i + size] for i in range(0, len(records), size)]
+    return {name if i == 0 else f"{name}-{i + 1}": kind.draw(saved, part) for i, part in enumerate(parts)}
+
+
+def draw(saved: Diagnosed):
+    """Answer and place in words; probabilities; before and after; gap map."""
+    row_in = diagnosis_map.row_height_in(saved, *ROW_IN)
+    records = diagnosis_map.heaviest(saved, diagnosis_map.fitting(MAP_IN, row_in))
+    row_in = diagnosis_map.row_height_in(saved, *ROW_IN, len(records))
+    lines = textwrap.wrap(drawable(saved.inconclusive or saved.where.get("summary") or "", 3 * _LINE - 6), _LINE)
+    held = len(diagnosis_closed.rows(saved, records)) if saved.shrink else 0
+    heights = (
+        0.32 + 0.17 * len(lines),
+        max(1.8, 0.85 + 0.19 * bar_lines(saved), 1.0 + 0.22 * held),
+        0.85 + row_in * 2.22 * len(records) if saved.cells else 0.5,
+    )
+    with styled():
+        figure = new_figure(sum(heights))
+        head, upper, lower = figure.subfigures(3, 1, height_ratios=heights)
+        _head(head, heights[0], drawable(answer_words(saved), 80), lines)
+        which, closed = upper.subplots(1, 2, width_ratios=[1.1, 1])
+        _which(which, saved)
+        _closed(upper, closed, saved, records)
+        _where(lower.subplots(), saved, records, row_in)
+    return figure
+
+
+def _head(part, height, answer, lines):
+    part.text(0.008, 1 - 0.05 / height, answer, va="top", fontsize=12, fontweight="bold")
+    part.text(0.008, 1 - 0.29 / height, "\n".join(lines), va="top", fontsize=8.5, linespacing=1.25)
+
+
+def _which(axes, saved):
+    if saved.result["which"]:
+        draw_bars(axes, saved)
+    else:
+        _absent(axes, "Which effect?", "no probabilities were found")
+
+
+def _closed(part, axes, saved, records):
+    if not saved.shrink:
+        return _absent(axes, "How far does it close?", "no effect was added to the model")
+    diagnosis_closed.draw_before_after(axes, saved, records)
+    if saved.effects == ["unknown"]:
+        axes.set_title("How far with the best candidate?", loc="left", fontweight="bold")
+    part.legend(
+        handles=diagnosis_closed.before_after_handles(),
+        loc="outside lower right",
+        ncols=3,
+        handletextpad=0.4,
+        columnspacing=1.2,
+        borderaxespad=0.1,
+    )
+
+
+def _where(axes, saved, records, row_in):
+    if not saved.cells:
+        return _absent(axes, "Where?", "no gap map was saved")
+    diagnosis_map.draw_map(axes, saved, records, row_in, numbers=False)
+    some = f" ({len(records)} of {len(saved.records)} records)" if len(records) < len(saved.records) else ""
+    axes.set_title(f"Where?{some}", loc="left", fontweight="bold")
+    diagnosis_map.add_key(axes)
+
+
+def _absent(axes, title, text):
+    axes.set_axis_off()
+    axes.set_title(title, loc="left", fontweight="bold")
+    axes.text(0, 0.8, text, transform=axes.transAxes, va="top")

@@ -1,0 +1,96 @@
+"""A diagnosis in words: the answer, effects and parameters, safe to draw."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from backdrive_bayes.figures.diagnosis_saved import Diagnosed, Hypothesis
+from backdrive_bayes.figures.fonts import uncovered
+from backdrive_bayes.figures.style import display_unit, words
+
+_INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
+_GLOSS = {"unknown": "unknown (not listed)", "none": "none (no gap)"}
+
+
+def drawable(text, longest: int) -> str:
+    """Somebody else's text in one line of at most ``longest`` characters; what the font lacks is spelt out."""
+    text = " ".join(str(text).split())
+    missing = uncovered(text)
+    bad = {c for c in text if c in missing or unicodedata.category(c) in _INVISIBLE}
+    text = "".join(f"\\u{{{ord(c):X}}}" if c in bad else c for c in text)
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def effect_words(effect: str) -> str:
+    """An effect's name, or those of a pair, in words."""
+    return " + ".join(words(part) for part in effect.split("+"))
+
+
+def hypothesis_words(hypothesis: Hypothesis) -> str:
+    """A line of the probability table or chart."""
+    return label_words(hypothesis.effect) if hypothesis.effect else f"{hypothesis.count} others together"
+
+
+def label_words(effect: str) -> str:
+    """An effect, a pair, "unknown" or "none" in words that stand alone."""
+    return _GLOSS.get(effect, effect_words(effect))
+
+
+def parameter_words(saved: Diagnosed, name: str) -> str:
+    """A parameter in words; ``name[1]`` is that of the second record."""
+    base, bracket, record = name.partition("[")
+    if bracket and record[:-1].isdecimal() and int(record[:-1]) < len(saved.records):
+        return f"{words(base)}, {saved.labels[int(record[:-1])]}"
+    return words(name)
+
+
+def shown_unit(unit: str, values) -> tuple[float, str]:
+    """Factor and name of the unit in which values saved in ``unit`` are shown; mN·m for small torques."""
+    if unit == "N·m" and max(abs(v) for v in values) < 0.1:
+        return 1e3, "mN·m"
+    return display_unit(unit)
+
+
+def own_of_a_record(name: str) -> bool:
+    """Whether a parameter belongs to a single record, such as ``drift[1]``."""
+    return name.endswith("]")
+
+
+def chance(probability: float) -> str:
+    """A probability as per cent that never claims certainty."""
+    percent = 100 * probability
+    if probability > 0 and percent < 1:
+        return "<1 %"
+    return ">99 %" if probability < 1 and percent > 99 else f"{percent:.0f} %"
+
+
+def share_text(interval: dict | None) -> str:
+    """A fraction with its interval as per cent."""
+    if not interval:
+        return "not defined"
+    median, lo, hi = (f"{100 * interval[k] + 0.0:.0f}".replace("-", "−") for k in ("median", "lo", "hi"))
+    return f"{median} %" if interval["lo"] == interval["hi"] else f"{median} % [{lo}, {hi}]"
+
+
+def signed(value: float | None) -> str:
+    """A shift with its sign and one decimal."""
+    return "–" if value is None else f"{value:+.1f}".replace("-", "−")
+
+
+def answer_words(saved: Diagnosed) -> str:
+    """The answer in one phrase."""
+    if saved.inconclusive:
+        return "Inconclusive: no effect is named"
+    if not saved.effects:
+        return f"No gap: the baseline explains the data{_probability(saved, 'none')}"
+    if saved.effects == ["unknown"]:
+        return f"A gap of unknown cause{_probability(saved, 'unknown')}"
+    named = effect_words("+".join(saved.effects))
+    found = saved.answered()
+    chances = f" ({chance(found[0]['probability'])})" if len(found) == 1 else ""
+    return named[:1].upper() + named[1:] + chances
+
+
+def _probability(saved, effect):
+    found = [e for e in saved.hypotheses if e["effect"] == effect]
+    return f" ({chance(found[0]['probability'])})" if found else ""

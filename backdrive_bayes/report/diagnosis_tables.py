@@ -1,0 +1,139 @@
+"""The tables of a diagnosis' chapter, from the saved object alone."""
+
+from __future__ import annotations
+
+from backdrive_bayes.figures.diagnosis_closed import AT_MOST, rows
+from backdrive_bayes.figures.diagnosis_saved import Diagnosed
+from backdrive_bayes.figures.diagnosis_words import (
+    effect_words,
+    hypothesis_words,
+    own_of_a_record,
+    parameter_words,
+    share_text,
+    shown_unit,
+    signed,
+)
+from backdrive_bayes.figures.style import ARCMIN_PER_RAD
+from backdrive_bayes.report.blocks import Note, Table
+from backdrive_bayes.report.fit_tables import INDICATORS
+from backdrive_bayes.report.numbers import decimals, fixed, interval_text, significant
+from backdrive_bayes.report.text import free
+
+TOP = 6
+MOST_PARAMETERS = 30
+
+
+def _arcmin(value):
+    return significant(value, 3, ARCMIN_PER_RAD)
+
+
+def probability_text(probability: float | None) -> str:
+    """A probability with three decimals that never claims certainty."""
+    if probability is not None and 0 < probability < 5e-4:
+        return "<0.001"
+    return ">0.999" if probability is not None and 0.9995 <= probability < 1 else fixed(probability, 3)
+
+
+def gap_text(saved: Diagnosed) -> str:
+    """Probability and size of the gap."""
+    gap = saved.gap
+    if not gap:
+        return "not judged"
+    size = f"rms {_arcmin(gap.get('rms_rad'))} arcmin, noise floor {_arcmin(gap.get('noise_floor_rad'))} arcmin"
+    return f"probability {probability_text(gap.get('probability'))}; {size}"
+
+
+def probabilities(saved: Diagnosed) -> list:
+    """The most probable hypotheses, "unknown" and "none"."""
+    if not saved.result["which"]:
+        return []
+    lines = [
+        [free(hypothesis_words(h), 90), probability_text(h.probability), "yes" if h.in_set else "–"] for h in saved.ranked(TOP)
+    ]
+    note = Note("Probabilities of all hypotheses sum to 1. A name with + stands for two effects at once.")
+    return [Table(["Hypothesis", "Probability", "In the 90 % credible set"], lines, [2.2, 0.8, 1.2]), note]
+
+
+def effect_parameters(saved: Diagnosed) -> list:
+    """Parameters of the effects that are named, each with its interval and unit."""
+    blocks = []
+    for entry in [] if saved.inconclusive else saved.answered():
+        found = entry.get("parameters") or {}
+        lines = [_parameter(saved, n, about) for n, about in found.items() if not own_of_a_record(n)]
+        title = free(f"Parameters of {effect_words(entry['effect'])}", 120)
+        blocks += [Table([title, "Median [interval]", "Unit"], lines, [2, 1.4, 0.8])] if lines else []
+        own = sum(map(own_of_a_record, found))
+        blocks += [Note(f"Left out: {own} of single records, such as phases and initial positions.")] if own else []
+    return blocks
+
+
+def _parameter(saved, name, about):
+    factor, unit = shown_unit(about.get("unit", ""), [about["median"]])
+    return [free(parameter_words(saved, name), 60), interval_text(about, factor), free(unit or "–", 20)]
+
+
+def shrink(saved: Diagnosed) -> list:
+    """Rms before and after on held-out data, the noise floor and the closed fraction, beside the control's."""
+    if not saved.shrink:
+        return []
+    shown = rows(saved, list(range(len(saved.records)))[:AT_MOST])
+    lines = [
+        [
+            free(name, 40),
+            *(_arcmin(entry.get(k)) for k in ("before_rad", "after_rad", "noise_floor_rad")),
+            share_text(entry.get("closed_fraction")),
+        ]
+        for name, entry in shown
+    ]
+    control = (saved.shrink.get("gaussian_process") or {}).get("closed_fraction")
+    if control:
+        lines.append(["Gaussian process (control)", "–", "–", "–", share_text(control)])
+    columns = ["Held out", "before [arcmin]", "after [arcmin]", "noise floor [arcmin]", "closed fraction"]
+    note = Note("Root mean square of measured minus modelled angle, before and after the effect is added to the model.")
+    return [Table(columns, lines, [1.5, 1, 1, 1.2, 1.3]), note]
+
+
+def indicators(saved: Diagnosed) -> list:
+    """Indicators of the reducer before and after, with the change of the median."""
+    found = saved.shrink.get("indicators") or {}
+    lines = []
+    for key, name, unit, factor in INDICATORS:
+        if key in found:
+            before, after = (found[key].get(k) or None for k in ("before", "after"))
+            texts = (interval_text(before, factor), interval_text(after, factor))
+            lines.append([name, unit, *texts, _change(before, after, factor)])
+    if not lines:
+        return []
+    note = Note("Indicators of the reducer without and with the effect in the model; the change is that of the median.")
+    return [Table(["Indicator", "Unit", "Before", "After", "Change"], lines, [1.6, 0.6, 1.3, 1.3, 0.7]), note]
+
+
+def _change(before, after, factor):
+    if not before or not after:
+        return "–"
+    n = decimals(0.5 * factor * (after["hi"] - after["lo"]), factor * after["median"])
+    return f"{factor * (after['median'] - before['median']):+.{n}f}".replace("-", "−")
+
+
+def parameter_shift(saved: Diagnosed) -> list:
+    """The baseline's parameters before and after, largest shift first."""
+    lines = []
+    for shift in saved.shifts[:MOST_PARAMETERS]:
+        factor, unit = shown_unit(shift["unit"], [shift[k]["median"] for k in ("before", "after")])
+        intervals = (interval_text(shift[k], factor) for k in ("before", "after"))
+        lines.append(
+            [free(parameter_words(saved, shift["parameter"]), 60), free(unit or "–", 20), *intervals, signed(shift["shift_sd"])]
+        )
+    columns = ["Parameter", "Unit", "Before", "After", "Shift [own sd]"]
+    return [Table(columns, lines, [1.5, 0.8, 1.2, 1.2, 0.95])] if lines else []
+
+
+def convergence(saved: Diagnosed) -> list:
+    """Convergence numbers of the enlarged model's posterior."""
+    found = saved.result.get("convergence")
+    if not found:
+        return []
+    numbers = [fixed(found.get("max_rhat"), 4), *(fixed(found.get(k), 0) for k in ("min_bulk_ess", "min_tail_ess"))]
+    line = ["yes" if found["converged"] else "NO", *numbers, free(parameter_words(saved, str(found.get("worst", "–"))), 60)]
+    columns = ["Converged", "largest R-hat", "smallest bulk ESS", "smallest tail ESS", "slowest quantity"]
+    return [Table(columns, [line], [0.8, 0.9, 1.1, 1.1, 1.8])]

@@ -1,0 +1,67 @@
+"""The sentences of a diagnosis: verdict, next test, terms."""
+
+from __future__ import annotations
+
+from backdrive_bayes.figures.diagnosis_saved import Diagnosed
+from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, share_text
+from backdrive_bayes.report.blocks import Facts, Paragraph
+from backdrive_bayes.report.numbers import significant
+from backdrive_bayes.report.text import Free, free
+
+TERMS = [
+    ("Gap", "what the baseline leaves of the measured angle beyond the noise and beyond its own small misfit"),
+    ("Noise floor", "rms that noise alone would leave; from replicate cycles where there are any"),
+    ("Probability", "posterior probability of each hypothesis, the baseline's parameters re-fitted with each"),
+    ("unknown", "something is missing in the model, and no effect in the list explains it"),
+    ("none", "the baseline explains the data to the noise"),
+    ("90 % credible set", "the most probable hypotheses that together hold at least 90 %"),
+    ("Closed fraction", "share of the gap above the noise that vanishes on data left out of the fit; 100 %: down to the noise"),
+    ("Gaussian process", "a residual curve free to bend anywhere, as a control: it closes a gap without naming a cause"),
+    ("loading, unloading", "torque running away from zero, and back to zero"),
+]
+"""What the words of this chapter mean."""
+
+
+def verdict(saved: Diagnosed) -> tuple[str, str, str]:
+    """Tone, title and text of the banner."""
+    if saved.inconclusive:
+        reason = free(saved.inconclusive, 400).rstrip(".")
+        text = Free(f"Reason: {reason}. Do not name a cause from this result.")
+        return "bad", "INCONCLUSIVE: no effect is named", text
+    where = free(saved.where.get("summary") or "", 400)
+    if not saved.effects:
+        return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))
+    rivals = _rivals(saved)
+    named = "GAP FOUND, CAUSES STILL CONFUSABLE" if rivals else "GAP FOUND, CAUSE NAMED"
+    title = "GAP OF UNKNOWN CAUSE" if saved.effects == ["unknown"] else named
+    return "caution", title, Free(_join(answer_words(saved), where, rivals, _closed(saved)))
+
+
+def _join(*sentences):
+    return " ".join(s if s.endswith(".") else f"{s}." for s in sentences if s)
+
+
+def _rivals(saved):
+    named = frozenset(saved.effects or ["none"])
+    rivals = [label_words(e) for e in saved.credible_set if frozenset(e.split("+")) != named]
+    return f"Not ruled out at 90 %: {', '.join(rivals)}." if rivals else ""
+
+
+def _closed(saved):
+    if not saved.shrink.get("closed_fraction"):
+        return ""
+    what = "The best listed candidate" if saved.effects == ["unknown"] else "Added to the model, it"
+    return f"{what} closes {share_text(saved.shrink['closed_fraction'])} of the gap on held-out data."
+
+
+def next_test(saved: Diagnosed) -> list:
+    """The measurement that would best tell what is still confusable; empty where none is proposed."""
+    test = saved.result.get("next_test")
+    if not test:
+        return []
+    rows = [("Separates", free(", ".join(label_words(e) for e in test.get("separates") or []) or "not recorded"))]
+    if test.get("expected_entropy_drop_bits") is not None:
+        drop = significant(test["expected_entropy_drop_bits"], 2)
+        rows.append(("Expected gain", f"{drop} bit less uncertainty about the cause"))
+    todo = str(test.get("do") or "").strip()
+    return [Paragraph(free(todo[:1].upper() + todo[1:], 600)), Facts(rows)]

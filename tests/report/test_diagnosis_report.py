@@ -1,0 +1,146 @@
+"""The chapter of a diagnosis: its numbers are those of diagnosis.json, and what is missing is left out."""
+
+import io
+import json
+
+import pypdf
+import pytest
+from support.made_up_diagnosis import write_diagnosis
+from support_results import write_result
+
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.report import report
+from backdrive_bayes.report.diagnosis_tables import probability_text
+from backdrive_bayes.report.numbers import interval_text, significant
+
+ARCMIN = 10800 / 3.141592653589793
+HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref // S_g"
+
+
+def pages_of(folder):
+    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([folder])))
+    return [" ".join(p.extract_text().split()) for p in reader.pages], reader
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("diagnosis")
+    return write_diagnosis(folder), *pages_of(folder)
+
+
+def test_the_first_page_is_verdict_place_and_overview(made):
+    _, pages, reader = made
+    for needed in (
+        "GAP FOUND, CAUSES STILL CONFUSABLE",
+        "Interface slip (87 %)",
+        "78 % of the gap lies on the loading branches",
+        "Not ruled out at 90 %: second backlash",
+        "closes 91 % [88, 95] of the gap",
+        "probability 0.998; rms 1.24 arcmin, noise floor 0.107 arcmin",
+        "interface slip, second backlash",
+        "Which effect?",
+        "Signature",
+    ):
+        assert needed in pages[0], needed
+    assert reader.metadata.title == "Backdrivability report: unit-38: diagnosis"
+
+
+def test_tables_hold_the_numbers_of_the_json(made):
+    result, pages, _ = made
+    text = " ".join(pages)
+    for entry in [*result["which"][:3], result["which"][4]]:
+        assert f"{entry['probability']:.3f}" in text
+    slip = result["which"][0]["parameters"]
+    assert f"slip angle {interval_text(slip['slip_angle'], ARCMIN)} arcmin" in text
+    assert f"slip threshold {interval_text(slip['slip_threshold'])} N·m" in text
+    for entry in [*result["shrink"]["records"], result["shrink"]]:
+        fraction = entry["closed_fraction"]
+        numbers = [significant(entry[k], 3, ARCMIN) for k in ("before_rad", "after_rad", "noise_floor_rad")]
+        assert f"{' '.join(numbers)} {100 * fraction['median']:.0f} % [" in text
+    assert "Gaussian process (control) – – – 71 % [59, 83]" in text
+    area = result["shrink"]["indicators"]["loop_area_J"]
+    assert f"{interval_text(area['before'], 1e3)} {interval_text(area['after'], 1e3)} −0.54" in text
+    shift = result["parameter_shift"][2]
+    moved = f"{interval_text(shift['before'], ARCMIN)} {interval_text(shift['after'], ARCMIN)} −6.8"
+    assert f"compliance arcmin/(N·m) {moved}" in text
+    assert "drag torque mN·m 31 [28, 34] 29.0 [27.0, 31.0] −1.1" in text
+    assert "slip vanishes there" in text and "0.34 bit" in text and "1.0060" in text
+
+
+def test_the_same_result_gives_the_same_bytes(tmp_path):
+    write_diagnosis(tmp_path, 1)
+    assert report.report_bytes([tmp_path]) == report.report_bytes([tmp_path])
+
+
+def test_a_gap_that_is_not_there(tmp_path):
+    which = [{"effect": "none", "probability": 0.97}, {"effect": "unknown", "probability": 0.03}]
+    answer = {"effects": [], "credible_set_90": ["none"]}
+    write_diagnosis(tmp_path, answer=answer, which=which, gap=None, shrink=None, next_test=None)
+    pages, _ = pages_of(tmp_path)
+    assert "NO GAP" in pages[0] and "none (no gap)" in pages[0] and "Not ruled out" not in pages[0]
+    assert not any("How far it shrinks" in p or "Next test" in p or "What it changes" in p for p in pages)
+
+
+def test_an_unknown_cause_credits_nothing_to_a_name(tmp_path):
+    write_diagnosis(tmp_path, answer={"effects": ["unknown"], "credible_set_90": ["unknown"]})
+    pages, _ = pages_of(tmp_path)
+    assert "GAP OF UNKNOWN CAUSE" in pages[0] and "The best listed candidate closes 91 %" in pages[0]
+    assert "Parameters of" not in " ".join(pages)
+
+
+@pytest.mark.parametrize("changes", [{}, {"which": [], "where": {"summary": "", "map": []}, "records": [], "residual": []}])
+def test_inconclusive_gives_the_reason_and_no_name(tmp_path, changes):
+    gone = {"gap": None, "shrink": None, "next_test": None}
+    write_diagnosis(tmp_path, 1, inconclusive="the record holds less than one cycle", **gone, **changes)
+    pages, _ = pages_of(tmp_path)
+    assert "INCONCLUSIVE" in pages[0] and "less than one cycle" in pages[0] and "not judged" in pages[0]
+    text = " ".join(pages)
+    assert "CAUSE NAMED" not in text and "Parameters of" not in text and "Interface slip (" not in text
+
+
+def test_sampling_that_has_not_converged_is_inconclusive(tmp_path):
+    folder = tmp_path / "r"
+    result = write_diagnosis(folder, 1)
+    convergence = result["convergence"] | {"converged": False, "advice": "give it more time"}
+    write_diagnosis(folder, 1, convergence=convergence)
+    pages, _ = pages_of(folder)
+    assert "INCONCLUSIVE" in pages[0] and "give it more time" in pages[0]
+
+
+def test_free_text_prints_as_it_stands(tmp_path):
+    result = write_diagnosis(tmp_path, 1)
+    result["where"]["summary"] = result["next_test"]["do"] = HOSTILE
+    result["which"][0]["parameters"] = {HOSTILE: {"median": 1, "lo": 0, "hi": 2, "unit": "#x"}}
+    write_diagnosis(tmp_path, 1, **{k: result[k] for k in ("where", "next_test", "which")}, unit=HOSTILE)
+    pages, reader = pages_of(tmp_path)
+    assert pages[0].count(HOSTILE) >= 3 and HOSTILE in reader.metadata.title
+    assert " ".join(HOSTILE.replace("_", " ").split())[:40] in " ".join(pages[1:]) and "#x" in " ".join(pages)
+
+
+def test_many_records_and_a_pair_keep_the_summary_on_one_page(tmp_path):
+    pair = "rate_dependent_friction+viscoelastic_creep"
+    answer = {"effects": pair.split("+"), "credible_set_90": [pair, "interface_slip"]}
+    write_diagnosis(tmp_path, 8, answer=answer)
+    pages, _ = pages_of(tmp_path)
+    assert "Signature" in pages[0] and "Rate dependent friction + viscoelastic creep" in pages[0]
+    assert "Which effect?" in pages[0] and "Where? (" in pages[0]
+
+
+def test_a_fit_and_a_diagnosis_in_one_folder_make_two_chapters(tmp_path):
+    write_diagnosis(tmp_path, 1)
+    write_result(tmp_path, records=1)
+    (tmp_path / "posterior.nc").unlink()
+    pages, _ = pages_of(tmp_path)
+    assert "CONVERGED" in pages[0] and "CAUSE" in pages[1]
+
+
+def test_a_broken_result_is_one_clear_line(tmp_path):
+    result = write_diagnosis(tmp_path, 1)
+    del result["where"]["map"][0]["branch"]
+    (tmp_path / "diagnosis.json").write_text(json.dumps(result))
+    with pytest.raises(BadInput, match="diagnosis.json: expected a complete result file"):
+        report.report_bytes([tmp_path])
+
+
+def test_probabilities_never_claim_certainty():
+    assert [probability_text(p) for p in (0.0, 1e-6, 0.25, 0.99999, 1.0)] == ["0.000", "<0.001", "0.250", ">0.999", "1.000"]
