@@ -23,6 +23,7 @@ CAPTIONS = {
     "closed-fraction": diagnosis_closed.CAPTION,
     "parameter-shift": diagnosis_shift.CAPTION,
 }
+FINE_DPI = 150
 ROW_IN = (0.19, 0.14)
 """Height of a row of the map at a glance and of a stripe in it, at least [inch]."""
 MAP_IN = 2.3
@@ -43,7 +44,22 @@ def figures_of(saved: Diagnosed) -> dict[str, Figure]:
         out |= _split("closed-fraction", diagnosis_closed, saved, everything, diagnosis_closed.AT_MOST)
     if saved.shifts:
         out["parameter-shift"] = diagnosis_shift.draw(saved)
+    for figure in out.values():
+        _settle(figure)
     return out
+
+
+def _settle(figure):
+    """Fix the layout; the solver's last bits vary from run to run, and the files would show it."""
+    with styled():
+        # Letters are a little wider at some resolutions: room for them as they are printed.
+        figure.set_dpi(FINE_DPI)
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for part in figure.subfigs:
+        part.bbox_relative.set_points(part.bbox_relative.get_points().round(5))
+    for axes in figure.axes:
+        axes.set_position([round(x, 5) for x in axes.get_position().bounds])
 
 
 def _split(name, kind, saved, records, at_most):

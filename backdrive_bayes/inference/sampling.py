@@ -51,11 +51,11 @@ class Settings:
     """How long and how widely to sample; the defaults fit one unit of up to eight records."""
 
     ensembles: int = 4
-    walkers: int = 64
-    block: int = 60
+    walkers: int = 160
+    block: int = 40
     warm_up_blocks: int = 6
-    refits: int = 8
-    kept_per_ensemble: int = 1000
+    refits: int = 3
+    kept_per_ensemble: int = 1500
     max_seconds: float = 120.0
     good_share: float = 0.15
 
