@@ -60,11 +60,11 @@ def _sample(unit, baseline, found, args, note):
 
 def _draw(folder: Path) -> None:
     try:
-        from backdrive_bayes.figures.diagnosis import save_diagnosis_figures
+        from backdrive_bayes.figures.catalogue import save_figures
     except MissingExtra as missing:
         say(f"no figures: {missing}")
     else:
-        save_diagnosis_figures(folder, folder / "figures")
+        save_figures(folder, folder / "figures")
 
 
 def _summarise(result: dict, out: Path) -> None:

@@ -150,7 +150,7 @@ class _Found:
         found = shrink(self.setting, none, chosen.fitted, gap.weight, self.rng)
         before, after = found.before.mean(axis=0), found.after.mean(axis=0)
         floor, several = found.floor.mean(), len(self.setting.problem.records) > 1
-        control = closed_fraction(found.before.mean(), found.control.mean(), floor)
+        control = closed_fraction(before, found.control.mean(axis=0), floor)
         return {
             "held_out": "records left out in turn" if several else "legs left out in turn",
             "before_rad": float(np.sqrt(np.median(before))),
@@ -167,7 +167,7 @@ class _Found:
                 }
                 for name, b, a, f in zip(found.names, found.before, found.after, found.floor, strict=True)
             ],
-            "gaussian_process": {"closed_fraction": {"median": float(control), "lo": float(control), "hi": float(control)}},
+            "gaussian_process": {"closed_fraction": interval(control, LEVEL)},
             "indicators": draws.indicator_change(self.setting, none, z_none, chosen.fitted, z_chosen, self.k, LEVEL),
         }
 

@@ -42,7 +42,8 @@ def weigh_fast(setting: Setting, fitted: Fitted) -> Fast:
 
 
 def _angle_periods(legs):
-    step = np.median([np.median(np.abs(np.diff(leg.angle_rad))) for leg in legs])
+    # Where the reading stands still between its quanta the median step may be zero.
+    step = np.median([np.mean(np.abs(np.diff(leg.angle_rad))) for leg in legs])
     span = max(np.ptp(leg.angle_rad) for leg in legs)
     return np.geomspace(min(5 * step, 0.05 * span), 0.1 * span, PERIODS)
 

@@ -10,6 +10,7 @@ from backdrive_bayes.inference.problem import Problem
 SAME_LOOP = 0.05
 """Relative difference of amplitudes below which two records run the same loop."""
 FIRST_LEG_SHARED = 0.5
+SHARP = 6.0
 
 
 class Places:
@@ -42,12 +43,13 @@ class Places:
         return self._scaled(share * common * np.exp(-apart / length))
 
     def shape(self, length: float) -> np.ndarray:
-        """Smooth function of the place on the loop (Matérn-3/2), half of it common to all records, half each record's own."""
+        """Function of the place on the loop with smooth and sharp parts, half of it common to all records, half each one's own."""
         apart = np.abs(self.phase[:, None] - self.phase)
         apart = np.sqrt(3) * np.minimum(apart, 1 - apart) / length
+        smooth, sharp = ((1 + d) * np.exp(-d) for d in (apart, SHARP * apart))
         common = 0.5 + 0.5 * self._same_record()
         share = np.where(self.first[:, None] == self.first, 1.0, FIRST_LEG_SHARED)
-        return common * share * (1 + apart) * np.exp(-apart)
+        return common * share * 0.5 * (smooth + sharp)
 
     def misfit(self, length: float) -> np.ndarray:
         """What a bench that is never quite clean leaves of any model: mostly the same in equal loops, a little of each kind."""

@@ -20,7 +20,7 @@ MISFIT = ("misfit", MISFIT_LENGTH, 0.3)
 
 @dataclass(frozen=True, eq=False)
 class Shrink:
-    """Mean square of what is left out [rad²] by fold (folds, draws): before and after; noise floor (folds,), control (folds,)."""
+    """Mean square of what is left out [rad²] by fold: before, after and control (folds, draws), noise floor (folds,)."""
 
     names: tuple[str, ...]
     before: np.ndarray
@@ -36,7 +36,7 @@ def shrink(setting: Setting, before: Fitted, after: Fitted, weight, rng) -> Shri
     for own in folds.values():
         floor = float(np.average(np.diag(setting.noise)[own], weights=weight[own]))
         lost = [_left_out(setting, fitted, own, weight, rng) for fitted in (before, after)]
-        rows.append((*lost, floor, _control(setting, before, own, weight)))
+        rows.append((*lost, floor, _control(setting, before, own, weight, rng)))
     return Shrink(tuple(folds), *(np.array([row[i] for row in rows]) for i in range(4)))
 
 
@@ -80,15 +80,18 @@ def _posterior(setting, fitted, rows):
     return -covariance @ (jacobian.T @ residual), np.linalg.cholesky(covariance + 1e-14 * np.eye(fitted.z.size))
 
 
-def _control(setting, fitted, own, weight):
-    """Mean square residual when a Gaussian process over the loop, fitted to the rest, predicts ``own``."""
+def _control(setting, fitted, own, weight, rng):
+    """Mean square residual when draws of a Gaussian process over the loop, fitted to the rest, predict ``own``, (draws,)."""
     rest = np.setdiff1d(np.arange(setting.places.record.size), own)
     kernel = setting.kernel("loop", MISFIT_LENGTH) * np.var(fitted.residual)
     factor = cho_factor(kernel[np.ix_(rest, rest)] + setting.noise[np.ix_(rest, rest)], lower=True)
     left = fitted.residual[rest] - _record_means(fitted.residual, setting.places.record)[rest]
-    residual = fitted.residual[own] - kernel[np.ix_(own, rest)] @ cho_solve(factor, left)
+    solved = cho_solve(factor, kernel[np.ix_(rest, own)])
+    spread = kernel[np.ix_(own, own)] - kernel[np.ix_(own, rest)] @ solved
+    lower = np.linalg.cholesky(spread + 1e-9 * np.trace(spread) / own.size * np.eye(own.size))
+    residual = fitted.residual[own] - left @ solved - rng.standard_normal((DRAWS, own.size)) @ lower.T
     share = weight[own] / weight[own].sum()
-    return float(share @ (residual - share @ residual) ** 2)
+    return ((residual - (residual @ share)[:, None]) ** 2) @ share
 
 
 def _record_means(values, record):

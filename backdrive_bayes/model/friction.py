@@ -6,8 +6,8 @@ import functools
 import weakref
 
 import numpy as np
-from scipy.special import ndtr
 
+from backdrive_bayes.model.hat_weights import hat_weights
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import BoundedLogNormal, Parameter, Uniform
 from backdrive_bayes.model.path import TorquePath
@@ -62,26 +62,6 @@ def _weights(*shared: tuple[tuple[int, ...], bytes]) -> np.ndarray:
     # The first element of the bank has no threshold: it passes the torque as it is.
     weights[..., :1] += free
     weights.flags.writeable = False
-    return weights
-
-
-def hat_weights(nodes, mean, spread):
-    """Mean-preserving weights on ``nodes`` of a log-normal variable of given mean and log-sd.
-
-    ``nodes`` has shape (nodes,) and begins at 0; ``mean`` and ``spread`` have shape (…, 1). Returns shape (…, nodes), sums
-    to 1. Each weight is the integral of a hat function over the density; mass beyond the last node goes to it.
-    """
-    z = np.full(np.broadcast_shapes(np.shape(mean), nodes.shape), -np.inf)
-    with np.errstate(divide="ignore"):
-        z[..., 1:] = (np.log(nodes[1:]) - np.log(mean)) / spread
-    mass, moment = ndtr(z + 0.5 * spread), mean * ndtr(z - 0.5 * spread)
-    gap = np.diff(nodes)
-    d_mass, d_moment = np.diff(mass), np.diff(moment)
-    rise = (d_moment - nodes[:-1] * d_mass) / gap
-    weights = np.zeros_like(mass)
-    weights[..., 1:] += rise
-    weights[..., :-1] += d_mass - rise
-    weights[..., -1] += 1 - mass[..., -1]
     return weights
 
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import lognorm
 
-from backdrive_bayes.model.friction import CONSTANT_SHARES, LOAD_RATIOS, hat_weights
+from backdrive_bayes.model.friction import CONSTANT_SHARES, LOAD_RATIOS
+from backdrive_bayes.model.hat_weights import hat_weights
 
 
 def nearest_node_weights(nodes, mean, spread):

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom, kstest, lognorm, norm, uniform
+from scipy.stats import binom, kstest, lognorm, loguniform, norm, uniform
 from support.known import SCALE, reducer
 
-from backdrive_bayes.model.parameter import BoundedLogNormal, LogNormal, Parameter, Uniform
+from backdrive_bayes.model.parameter import BoundedLogNormal, LogNormal, LogUniform, Normal, Parameter, Uniform
 
-PRIORS = {p.name: p.scaled_prior(SCALE) for p in reducer().parameters}
+from backdrive_bayes.model.registry import MEMBERS
+
+PRIORS = {p.name: p.scaled_prior(SCALE) for p in reducer(MEMBERS).parameters}
 
 
 class LogitNormal:
@@ -34,6 +36,10 @@ def stated(prior):
         return lognorm(prior.sigma, scale=prior.median)
     if isinstance(prior, BoundedLogNormal):
         return LogitNormal(prior)
+    if isinstance(prior, LogUniform):
+        return loguniform(prior.lo, prior.hi)
+    if isinstance(prior, Normal):
+        return norm(0, prior.sd)
     return uniform(prior.lo, prior.hi - prior.lo)
 
 

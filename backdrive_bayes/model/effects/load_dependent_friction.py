@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.model.friction import LOAD_RATIOS, hat_weights
+from backdrive_bayes.model.hat_weights import hat_weights
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import BoundedLogNormal, Parameter
 from backdrive_bayes.model.play import play
 
+LOAD_RATIOS = np.array([0.0, 0.015, 0.04, 0.08, 0.15, 0.3, 0.55, 0.9])
 MESH = "weakly informative; losses of a few per cent a mesh"
 
 

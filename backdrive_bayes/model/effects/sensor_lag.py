@@ -26,8 +26,9 @@ class SensorLag:
         time, angle = drive.path.time_s, drive.angle_rad
         low_pass = np.maximum(values["lag_time"] * values["lag_low_pass_share"], 1e-15)
         # The record begins half a sample before its first sample, at rest.
-        begin = 1.5 * angle[..., :1] - 0.5 * angle[..., 1:2]
-        slow = relax(angle, time, low_pass, begin)
+        behind = 0.5 * (angle[..., :1] - angle[..., 1:2])
+        start = angle[..., :1] + behind * np.exp(-0.5 * (time[1] - time[0]) / low_pass)
+        slow = relax(angle, time, low_pass, start)
         return delayed(slow, time, values["lag_time"] * (1 - values["lag_low_pass_share"])) - angle
 
 
