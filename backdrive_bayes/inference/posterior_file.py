@@ -15,11 +15,12 @@ SCHEMA = "backdrive-bayes/posterior/1"
 PREDICTIVE_PER_ENSEMBLE = 50
 
 
-def write_posterior(posterior: Posterior, path: Path) -> None:
+def write_posterior(posterior: Posterior, path: Path, more: dict | None = None) -> None:
     """Write the groups posterior, unconstrained_posterior, sample_stats, log_likelihood, posterior_predictive,
-    observed_data and constant_data; angles in rad, torques in N·m.
+    observed_data and constant_data; angles in rad, torques in N·m. ``more`` are further datasets by group name.
     """
-    groups = posterior_groups(posterior)
+    extra = {name: dataset.assign_attrs(_attributes(posterior) | dataset.attrs) for name, dataset in (more or {}).items()}
+    groups = posterior_groups(posterior) | extra
     mode = "w"
     for name, dataset in groups.items():
         encoding = {v: {"zlib": True, "complevel": 1} for v in dataset.data_vars if dataset[v].dtype.kind == "f"}

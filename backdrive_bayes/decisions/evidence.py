@@ -1,0 +1,223 @@
+"""What decisions rest on: the saved draws of one unit's indicators, asked by rate and amplitude."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.indicators.draws import CORE, UNITS, indicator_draws
+from backdrive_bayes.inference.fit import Posterior
+from backdrive_bayes.inference.posterior_file import read_group
+
+SAME_RATE = 0.1
+"""Relative difference up to which two loading rates are the same."""
+SAME_AMPLITUDE = 0.02
+"""Relative difference up to which two amplitudes are the same."""
+
+
+class NotAvailable(Exception):
+    """A loop or indicator that neither was measured nor can be predicted; its text says why."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A settled loop by rate [N·m/s] and amplitude [N·m], and the numbers of the records that tell of it.
+
+    ``predicted`` is true where the amplitude lies within a larger measured one.
+    """
+
+    rate: float
+    amplitude: float
+    records: tuple[int, ...]
+    predicted: bool = False
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"{self.rate:.3g} N·m/s, ±{self.amplitude:.3g} N·m{' (predicted)' if self.predicted else ''}"
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Draws of one unit under one model; ``about`` is its indicators object, ``draws`` the group of the same name.
+
+    ``parameters`` maps shared parameters to draws (draws,) in SI units; ``diagnosis`` is a diagnosis object or None.
+    """
+
+    about: dict
+    draws: object
+    parameters: dict[str, np.ndarray]
+    diagnosis: dict | None = None
+    where: str = ""
+
+    @classmethod
+    def read(cls, folder: Path) -> Evidence:
+        """From a result folder of a fit; BadInput where it is none or comes from a version that saved no draws."""
+        folder = Path(folder)
+        about = _json(folder / "indicators.json", "backdrive-bayes/indicators/1")
+        if not (folder / "posterior.nc").is_file():
+            raise BadInput(folder, "a result folder with posterior.nc", "none")
+        posterior = read_group(folder / "posterior.nc", "posterior")
+        path = folder / "diagnosis.json"
+        diagnosis = _json(path, "backdrive-bayes/diagnosis/1") if path.is_file() else None
+        shared = {str(n): v.values.ravel() for n, v in posterior.items() if v.dims == ("chain", "draw")}
+        return cls(about, read_group(folder / "posterior.nc", "indicators"), shared, diagnosis, str(folder))
+
+    @classmethod
+    def of(cls, posterior: Posterior, about: dict) -> Evidence:
+        """From a posterior in memory and its indicators object."""
+        physical = posterior.problem.physical(posterior.z)
+        shared = {c.parameter.name: physical[:, i] for i, c in enumerate(posterior.problem.coordinates) if c.record is None}
+        return cls(about, indicator_draws(posterior, about["k"]), shared, where=posterior.unit.name)
+
+    @property
+    def name(self) -> str:
+        """The unit's name."""
+        return self.about["unit"]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the sampling converged."""
+        return bool(self.about["convergence"]["converged"])
+
+    @property
+    def effects(self) -> set[str]:
+        """Everything that the fitted model holds, modules and effects."""
+        return {*self.about["model"]["modules"], *self.about["model"]["effects"]}
+
+    @property
+    def rated_torque(self) -> float:
+        """T_r [N·m]."""
+        return float(self.draws.attrs["rated_torque_nm"])
+
+    @cached_property
+    def kept(self) -> np.ndarray:
+        """Numbers of the draws for which smaller amplitudes are known."""
+        return self.draws["kept"].values
+
+    @cached_property
+    def measured(self) -> tuple[Loop, ...]:
+        """The measured loops in order of rate and amplitude; repeats of a record are one loop."""
+        rates, amplitudes = (self.draws[n].values for n in ("loading_rate_Nm_per_s", "amplitude_Nm"))
+        groups: list[list[int]] = []
+        for i in np.lexsort((amplitudes, rates)):
+            same = (g for g in groups if _same(rates, g[0], i, SAME_RATE) and _same(amplitudes, g[0], i, SAME_AMPLITUDE))
+            group = next(same, None)
+            if group is None:
+                groups.append([int(i)])
+            else:
+                group.append(int(i))
+        return tuple(Loop(float(rates[g].mean()), float(amplitudes[g].mean()), tuple(g)) for g in groups)
+
+    @property
+    def rates(self) -> list[float]:
+        """The measured loading rates, each once, rising [N·m/s]."""
+        return [loop.rate for loop in self.largest()]
+
+    def largest(self) -> list[Loop]:
+        """The loop of largest amplitude at every rate."""
+        best: list[Loop] = []
+        for loop in self.measured:
+            same = [i for i, b in enumerate(best) if abs(loop.rate / b.rate - 1) <= SAME_RATE]
+            if not same:
+                best.append(loop)
+            elif loop.amplitude > best[same[0]].amplitude:
+                best[same[0]] = loop
+        return best
+
+    def loop(self, rate: float, amplitude: float | None = None) -> Loop:
+        """The loop of that rate and amplitude (the largest measured one by default), predicted where it must be.
+
+        Raises NotAvailable for a rate that was not measured and for an amplitude beyond the measured one.
+        """
+        at_rate = [x for x in self.measured if abs(x.rate / rate - 1) <= SAME_RATE]
+        if not at_rate:
+            shown = ", ".join(f"{r:.3g}" for r in self.rates)
+            raise NotAvailable(f"rate {rate:.3g} N·m/s was not measured (only {shown} N·m/s) and rates cannot be predicted")
+        top = max(at_rate, key=lambda x: x.amplitude)
+        if amplitude is None:
+            return top
+        exact = [x for x in at_rate if abs(x.amplitude / amplitude - 1) <= SAME_AMPLITUDE]
+        if exact:
+            return min(exact, key=lambda x: abs(x.amplitude - amplitude))
+        larger = [x for x in at_rate if x.amplitude > amplitude]
+        if not larger:
+            measured = f"{top.amplitude:.3g} N·m at {top.rate:.3g} N·m/s"
+            raise NotAvailable(f"amplitude {amplitude:.3g} N·m lies beyond the measured {measured}")
+        nearest = min(larger, key=lambda x: x.amplitude)
+        lowest = float(self.draws["position_Nm"].values[nearest.records[0], 0])
+        if amplitude < lowest:
+            raise NotAvailable(f"amplitude {amplitude:.3g} N·m is below {lowest:.3g} N·m, the smallest that is predicted")
+        return Loop(nearest.rate, float(amplitude), nearest.records, True)
+
+    def values(self, name: str, loop: Loop, kept: bool = False) -> np.ndarray:
+        """Draws of an indicator, shape (draws,); of the kept draws where ``kept`` or the loop is predicted.
+
+        Repeats of a record count as one loop: the mean of their draws. Raises NotAvailable where it is not defined.
+        """
+        if loop.predicted:
+            values = self._predicted(name, loop)
+        else:
+            values = self.draws[name].values[..., list(loop.records)].mean(axis=-1).ravel().astype(float)
+            values = values[self.kept] if kept else values
+        if not np.isfinite(values).all():
+            raise NotAvailable(f"{name} is not defined at {loop.text}")
+        return values
+
+    def _predicted(self, name, loop):
+        if name not in CORE:
+            raise NotAvailable(f"{name} is known at measured amplitudes only, not at {loop.text}")
+        parts = []
+        for r in loop.records:
+            position = self.draws["position_Nm"].values[r]
+            values = self.draws[f"{name}_by_amplitude"].values[:, r].astype(float)
+            known = np.isfinite(values).all(axis=0)
+            if known.sum() < 2 or not position[known][0] <= loop.amplitude * (1 + 1e-9):
+                raise NotAvailable(f"{name} is not defined at {loop.text}")
+            parts.append(PchipInterpolator(position[known], values[:, known], axis=1)(loop.amplitude))
+        return np.mean(parts, axis=0)
+
+    def model_error_share(self, name: str, loop: Loop) -> float | None:
+        """Share of an indicator's variance that is due to model error; None where it was not kept."""
+        if name not in CORE:
+            return None
+        return float(self.draws["model_error_share"].values[CORE.index(name), list(loop.records)].mean())
+
+    def record_json(self, loop: Loop) -> dict:
+        """The record object of a loop's first record."""
+        return self.about["records"][loop.records[0]]
+
+    @property
+    def reproduction(self) -> dict:
+        """Data hash, seed, versions and model of the fit."""
+        a = self.draws.attrs
+        found = {k: a[k].item() if hasattr(a[k], "item") else a[k] for k in ("data_sha256", "seed", "versions") if k in a}
+        return found | {"model": self.about["model"], "folder": self.where}
+
+
+def known_indicator(name: str) -> bool:
+    """Whether limits, comparisons and claims may name it."""
+    return name in UNITS
+
+
+def _same(values, i, j, tolerance):
+    return abs(values[i] / values[j] - 1) <= tolerance
+
+
+def _json(path: Path, schema: str) -> dict:
+    try:
+        loaded = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise BadInput(path, "a result file", "no such file") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise BadInput(path, "a JSON result file", f"unreadable file ({type(error).__name__})") from None
+    found = loaded.get("schema") if isinstance(loaded, dict) else None
+    if found != schema:
+        raise BadInput(path, f"schema '{schema}'", repr(found))
+    return loaded
