@@ -32,7 +32,7 @@ class Matched:
 def compare(evidences, claims: Claims | None = None, rope: float = ROPE, level: float = 0.9, seed: int = 0) -> dict:
     """The comparison object of two or more units.
 
-    ``rope`` is the relative difference that counts as none. Raises BadInput where two units have no condition in common.
+    ``rope`` is the relative difference that counts as none. Raises BadInput where no two units have a condition in common.
     """
     evidences = list(evidences)
     if len(evidences) < 2:
@@ -40,6 +40,9 @@ def compare(evidences, claims: Claims | None = None, rope: float = ROPE, level: 
     names = unique_names(evidences)
     rng = np.random.default_rng([seed, 3])
     pairs = [_pair(a, b, names, evidences, rope, level, rng) for a, b in combinations(range(len(evidences)), 2)]
+    if not any(p["conditions"] for p in pairs):
+        reasons = "; ".join(dict.fromkeys(r["reason"] for p in pairs for r in p["refused"]))
+        raise BadInput(" and ".join(names), "a rate and amplitude in common", reasons)
     return {
         "schema": SCHEMA,
         "names": names,
@@ -88,8 +91,6 @@ def _alike(one: Matched, other: Matched) -> bool:
 def _pair(i, j, names, evidences, rope, level, rng) -> dict:
     a, b = evidences[i], evidences[j]
     matched, refused = match(a, b)
-    if not matched:
-        raise BadInput(f"{names[i]} and {names[j]}", "a rate and amplitude in common", "; ".join(r["reason"] for r in refused))
     conditions = []
     for m in matched:
         rows, left_out = _indicators(a, b, m, rope, level, rng)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from backdrive_bayes.decisions.prediction import LogError, error_between, shifted
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import CORE, UNITS, indicator_draws
 from backdrive_bayes.inference.fit import Posterior
@@ -55,6 +56,7 @@ class Evidence:
     parameters: dict[str, np.ndarray]
     diagnosis: dict | None = None
     where: str = ""
+    _log_errors: dict = field(default_factory=dict, repr=False)
 
     @classmethod
     def read(cls, folder: Path) -> Evidence:
@@ -146,15 +148,13 @@ class Evidence:
         exact = [x for x in at_rate if abs(x.amplitude / amplitude - 1) <= SAME_AMPLITUDE]
         if exact:
             return min(exact, key=lambda x: abs(x.amplitude - amplitude))
-        larger = [x for x in at_rate if x.amplitude > amplitude]
-        if not larger:
+        if amplitude > top.amplitude:
             measured = f"{top.amplitude:.3g} N·m at {top.rate:.3g} N·m/s"
             raise NotAvailable(f"amplitude {amplitude:.3g} N·m lies beyond the measured {measured}")
-        nearest = min(larger, key=lambda x: x.amplitude)
-        lowest = float(self.draws["position_Nm"].values[nearest.records[0], 0])
+        lowest = float(self.draws["position_Nm"].values[top.records[0], 0])
         if amplitude < lowest:
             raise NotAvailable(f"amplitude {amplitude:.3g} N·m is below {lowest:.3g} N·m, the smallest that is predicted")
-        return Loop(nearest.rate, float(amplitude), nearest.records, True)
+        return Loop(top.rate, float(amplitude), top.records, True)
 
     def values(self, name: str, loop: Loop, kept: bool = False) -> np.ndarray:
         """Draws of an indicator, shape (draws,); of the kept draws where ``kept`` or the loop is predicted.
@@ -162,7 +162,7 @@ class Evidence:
         Repeats of a record count as one loop: the mean of their draws. Raises NotAvailable where it is not defined.
         """
         if loop.predicted:
-            values = self._predicted(name, loop)
+            values = self.predicted(name, loop)
         else:
             values = self.draws[name].values[..., list(loop.records)].mean(axis=-1).ravel().astype(float)
             values = values[self.kept] if kept else values
@@ -170,9 +170,42 @@ class Evidence:
             raise NotAvailable(f"{name} is not defined at {loop.text}")
         return values
 
-    def _predicted(self, name, loop):
+    def predicted(self, name: str, loop: Loop) -> np.ndarray:
+        """Kept draws of a core indicator of a loop within its records' amplitude, with the prediction's own error (draws,)."""
         if name not in CORE:
             raise NotAvailable(f"{name} is known at measured amplitudes only, not at {loop.text}")
+        if name == "loop_area_J":
+            return self.predicted("dissipation_ratio", loop) * self.predicted("absorbed_J", loop)
+        ratio = np.log(loop.amplitude / self._measured_amplitude(loop))
+        return shifted(name, self._bare_prediction(name, loop), self._log_error(name).at(ratio))
+
+    def _measured_amplitude(self, loop):
+        return float(self.draws["position_Nm"].values[list(loop.records), -1].mean())
+
+    def _log_error(self, name) -> LogError:
+        if name not in self._log_errors:
+            # One stream an indicator: the same answer in whatever order questions are asked.
+            rng = np.random.default_rng([5, CORE.index(name)])
+            self._log_errors[name] = LogError(self._seen_errors(name), self.kept.size, rng)
+        return self._log_errors[name]
+
+    def _seen_errors(self, name):
+        """Log amplitude ratio and log error (draws,) of every measured loop that a larger one of its rate predicts."""
+        seen = []
+        for loop in self.measured:
+            top = self.loop(loop.rate)
+            if loop is top:
+                continue
+            try:
+                told = self._bare_prediction(name, Loop(top.rate, loop.amplitude, top.records, True))
+                found = self.values(name, loop, kept=True)
+            except NotAvailable:
+                continue
+            if (told > 0).all() and (found > 0).all():
+                seen.append((float(np.log(loop.amplitude / self._measured_amplitude(top))), error_between(name, found, told)))
+        return seen
+
+    def _bare_prediction(self, name, loop):
         parts = []
         for r in loop.records:
             position = self.draws["position_Nm"].values[r]

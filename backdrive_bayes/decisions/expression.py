@@ -25,6 +25,7 @@ METHODS = {
     "sensitivity": (),
     "least_squares": (),
     "effect": (),
+    "amplitude_Nm": (),
     **dict.fromkeys(UNITS, ("rate", "amplitude")),
 }
 """What stands after a unit's letter, with its keywords."""
@@ -141,8 +142,12 @@ def _check_call(node, letters):
             _check(k.value, frozenset())
         return used
     name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
-    if name not in FUNCTIONS or node.keywords or len(node.args) != 1:
+    if name not in FUNCTIONS or len(node.args) != 1:
         raise Wrong(f"expected one of {', '.join(FUNCTIONS)} of one series, found '{ast.unparse(node)[:60]}'")
+    if any(k.arg not in ("below", "above") for k in node.keywords):
+        raise Wrong(f"expected below= or above= in {name}(…), found '{ast.unparse(node)[:60]}'")
+    for k in node.keywords:
+        _check(k.value, frozenset())
     return _check(node.args[0], letters)
 
 
@@ -176,9 +181,12 @@ def _series(node, look_up, along):
     value = np.asarray(_run(node.args[0], look_up, along))
     if along is None or value.ndim != 2 or value.shape[1] != len(along):
         raise Wrong(f"{node.func.id} needs a series: say along = \"rate\", \"amplitude\" or \"torque\"")
-    if len(along) < 2:
-        raise Wrong(f"{node.func.id} needs a series of two values or more, found {len(along)}")
-    return np.asarray(FUNCTIONS[node.func.id](value, np.asarray(along)))[:, None]
+    along, cut = np.asarray(along), {k.arg: _run(k.value, look_up, None) for k in node.keywords}
+    # An end of the range belongs to it, rounding aside.
+    part = (along <= cut.get("below", np.inf) * (1 + 1e-3)) & (along >= cut.get("above", -np.inf) * (1 - 1e-3))
+    if part.sum() < 2:
+        raise Wrong(f"{node.func.id} needs a series of two values or more, found {int(part.sum())}")
+    return np.asarray(FUNCTIONS[node.func.id](value[:, part], along[part]))[:, None]
 
 
 def _mentions_unit(node) -> bool:
@@ -194,7 +202,7 @@ def _unit(node) -> str:
     if isinstance(node, ast.Call):
         return _unit(node.func)
     if isinstance(node, ast.Attribute):
-        return {"width_rad": "rad", "effect": "1", "sensitivity": "1", "least_squares": "1"}.get(node.attr, UNITS.get(node.attr, ""))
+        return {"width_rad": "rad", "effect": "1", "sensitivity": "1", "least_squares": "1", "amplitude_Nm": "N·m"}.get(node.attr, UNITS.get(node.attr, ""))
     if isinstance(node, ast.BinOp):
         sides = _unit(node.left), _unit(node.right)
         if isinstance(node.op, ast.Div) and _same_quantity(node.left, node.right):

@@ -56,23 +56,32 @@ class Quantities:
         if method in ("least_squares", "effect"):
             value = _classic(evidence, evidence.loop(rates[0]), arguments) if method == "least_squares" else _effect(evidence, arguments)
             return np.full((self.draws, 1), value)
+        if method == "amplitude_Nm":
+            fixed = np.array([evidence.loop(rates[0], claim.amplitude).amplitude])
+            return np.tile(along if claim.along == "amplitude" else fixed, (self.draws, 1))
         if method == "width_rad":
             return self._width(evidence, order, evidence.loop(rates[0], claim.amplitude), keywords, along, claim)
-        if along is not None and not keywords and claim.along != "torque":
-            return self._series(evidence, order, method, claim, rates, along)
+        if claim.along in ("rate", "amplitude") and claim.along not in keywords:
+            return self._series(evidence, order, method, claim, rates, along, keywords)
         loop = evidence.loop(keywords.get("rate", rates[0]), keywords.get("amplitude", claim.amplitude))
         return evidence.values(method, loop, kept=True)[order][:, None]
 
-    def _series(self, evidence, order, name, claim, rates, along):
+    def _series(self, evidence, order, name, claim, rates, along, keywords):
         if claim.along == "rate":
-            loops = [evidence.loop(r, claim.amplitude) for r in rates]
+            loops = [evidence.loop(r, keywords.get("amplitude", claim.amplitude)) for r in rates]
             return np.stack([evidence.values(name, x, kept=True)[order] for x in loops], axis=1)
         if name not in CORE:
             raise NotAvailable(f"{name} is not known along the amplitude")
         # All amplitudes from one record, so that steps between records are no part of the series.
-        top = evidence.loop(rates[0])
+        top = evidence.loop(keywords.get("rate", rates[0]))
         loops = [Loop(top.rate, float(t), top.records, True) for t in np.minimum(along, _highest(evidence, top))]
-        return np.stack([evidence.values(name, x)[order] for x in loops], axis=1)
+        return np.stack([self._one(evidence, name, x)[order] for x in loops], axis=1)
+
+    @staticmethod
+    def _one(evidence, name, loop):
+        if loop.amplitude >= _highest(evidence, loop) * (1 - 1e-6):
+            return evidence.values(name, Loop(loop.rate, loop.amplitude, loop.records), kept=True)
+        return evidence.values(name, loop)
 
     def _width(self, evidence, order, loop: Loop, keywords, along, claim):
         if loop.predicted:
