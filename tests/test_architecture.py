@@ -15,10 +15,12 @@ ORDER = (
     "model",
     "inference",
     "indicators",
+    "decisions",
     "bench",
     "figures",
     "report",
     "commands",
+    "api",
     "__main__",
 )
 """A room imports only from itself and from rooms to its left."""
@@ -28,8 +30,8 @@ FORBIDDEN = {
     "model": {"records"},
     "bench": {"inference", "indicators"},
     # A figure or a report is made from saved results and computes nothing.
-    "figures": {"records", "model", "inference", "indicators", "bench"},
-    "report": {"records", "model", "inference", "indicators", "bench"},
+    "figures": {"records", "model", "inference", "indicators", "decisions", "bench"},
+    "report": {"records", "model", "inference", "indicators", "decisions", "bench"},
 }
 READERS_OF_RESULTS = {"backdrive_bayes.inference.posterior_file"}
 """What figures and reports may import beyond that: it reads what was saved."""
@@ -150,6 +152,18 @@ def test_the_core_loads_no_optional_library():
     assert not loaded & set(HEAVY)
     assert "emcee" in loaded, "the subprocess must have loaded the core for this to mean something"
     assert "pyarrow" in loaded_after("import pyarrow")
+
+
+def test_importing_the_package_is_light():
+    loaded = loaded_after("import backdrive_bayes")
+    assert not loaded & {*HEAVY, "numpy", "scipy", "emcee", "xarray", "arviz_stats"}
+    assert "numpy" in loaded_after("import backdrive_bayes; backdrive_bayes.Unit")
+
+
+def test_decisions_load_no_optional_library():
+    modules = ", ".join(m for m in MODULES if room(m) == "decisions")
+    assert not loaded_after(f"import {modules}") & {*HEAVY}
+    assert not loaded_after("import backdrive_bayes.api") & {*HEAVY}
 
 
 def test_members_are_named_in_the_registry_only():

@@ -13,6 +13,8 @@ from backdrive_bayes.errors import BadInput, MissingExtra
 VERBS = {
     "check": "check",
     "fit": "fit",
+    "compare": "compare",
+    "accept": "accept",
     "predict": "predict",
     "report": "report",
     "demo": "demo",

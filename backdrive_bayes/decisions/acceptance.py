@@ -15,9 +15,10 @@ from backdrive_bayes.decisions.conformance import (
     monte_carlo_error,
     share,
 )
-from backdrive_bayes.decisions.evidence import Evidence, Loop, NotAvailable
+from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.global_risk import global_risks, process_of_batch
 from backdrive_bayes.decisions.limits import Limit, Limits
+from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops
 from backdrive_bayes.decisions.next_step import advice, repeats_to_settle
 from backdrive_bayes.decisions.structure import Structure, weigh
 from backdrive_bayes.errors import BadInput
@@ -87,24 +88,29 @@ def _judge(structure: Structure, limit: Limit, limits: Limits) -> list[Judged]:
     first = structure.models[0].evidence
     if limit.k is not None and abs(limit.k - first.about["k"]) > 1e-9:
         raise BadInput(limit.where, f"k = {first.about['k']:g}, at which the lost motion was taken", f"k = {limit.k:g}")
+    loops = limited_loops(limit, first.measured)
     try:
-        rates = [limit.rate] if limit.rate is not None else _rates(first, limit)
-        loops = [first.loop(rate, limit.amplitude) for rate in rates]
         # A prediction is known for the kept draws only, and all limits are judged on the same draws.
         kept = any(x.amplitude is not None for x in limits.limits)
         values = [tuple(m.evidence.values(limit.indicator, loop, kept) for m in structure.models) for loop in loops]
     except NotAvailable as why:
-        raise BadInput(f"{limit.where}", "a loop that was measured or can be predicted", str(why)) from None
+        raise BadInput(limit.where, "an indicator that is defined there", str(why)) from None
     return [Judged(limit, loop, v) for loop, v in zip(loops, values, strict=True)]
 
 
-def _rates(evidence: Evidence, limit: Limit) -> list[float]:
-    """Where no rate is named, the limit holds for the unit's largest loops, or for all rates at which its amplitude is known."""
-    loops = evidence.largest()
-    if limit.amplitude is None:
-        top = max(x.amplitude for x in loops)
-        return [x.rate for x in loops if x.amplitude > 0.98 * top]
-    return [x.rate for x in loops if x.amplitude > 0.98 * limit.amplitude] or [loops[0].rate]
+def limited_loops(limit: Limit, measured) -> list[Loop]:
+    """The loops for which a limit holds, out of those that were measured or lie within them.
+
+    A limit that names no rate holds for the unit's largest loops, or at all rates at which its amplitude is known. BadInput
+    where there is none.
+    """
+    top = largest_loops(measured)
+    reach = limit.amplitude or max(x.amplitude for x in top)
+    rates = [limit.rate] if limit.rate is not None else [x.rate for x in top if x.amplitude > 0.98 * reach] or [top[0].rate]
+    try:
+        return [find_loop(measured, rate, limit.amplitude) for rate in rates]
+    except NotAvailable as why:
+        raise BadInput(limit.where, "a loop that was measured or can be predicted", str(why)) from None
 
 
 def _margin(row) -> float:
@@ -136,7 +142,9 @@ def _verdict(structure: Structure, risks: Risks, limits: Limits) -> tuple[Verdic
 
 
 def _p(probability: float) -> str:
-    return f"{100 * probability:.2g} %" if probability < 0.995 else f"{100 * probability:.1f} %"
+    if probability < 0.001:
+        return "below 0.1 %"
+    return f"{100 * probability:.2g} %" if probability < 0.99 else f"{min(100 * probability, 99.9):.1f} %"
 
 
 def _row(structure: Structure, judged: Judged, limits: Limits, batch) -> dict:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.decisions.conformance import share
-from backdrive_bayes.decisions.evidence import SAME_RATE, Evidence, NotAvailable
+from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.expression import Expression, Wrong
+from backdrive_bayes.decisions.loops import SAME_RATE, NotAvailable, same
 from backdrive_bayes.decisions.quantities import Quantities
 from backdrive_bayes.errors import BadInput
 
@@ -94,7 +94,8 @@ def _answer(claim: Claim, units: dict[str, Evidence], quantities) -> dict:
     if claim.is_probability:
         probability = float(np.mean(held))
     else:
-        probability = share(np.asarray(held))
+        # Pairings repeat draws: what can be told from so many draws is no finer than their number.
+        probability = (float(np.mean(held)) * quantities.fewest + 0.5) / (quantities.fewest + 1)
     worst = [units[u].name for u in sorted(claim.holds.units) if not units[u].converged]
     verdict = _verdict(probability) if not worst else "inconclusive"
     reason = f"the sampling of {' and '.join(worst)} has not converged" if worst else ""
@@ -135,7 +136,7 @@ def _number(claim, part, look_up, along, where):
 def _rates(claim, units) -> list[float]:
     """Rates that all units of the claim have in common."""
     own = [units[u] for u in sorted(claim.holds.units)] or list(units.values())[:1]
-    common = [r for r in own[0].rates if all(any(abs(s / r - 1) <= SAME_RATE for s in e.rates) for e in own[1:])]
+    common = [r for r in own[0].rates if all(any(same(s, r, SAME_RATE) for s in e.rates) for e in own[1:])]
     if not common:
         raise NotAvailable("the units have no rate in common, and rates cannot be predicted")
     return common

@@ -9,7 +9,8 @@ import numpy as np
 
 from backdrive_bayes.decisions.claims import Claims, answer
 from backdrive_bayes.decisions.conformance import share
-from backdrive_bayes.decisions.evidence import SAME_AMPLITUDE, SAME_RATE, Evidence, Loop, NotAvailable
+from backdrive_bayes.decisions.evidence import Evidence
+from backdrive_bayes.decisions.loops import SAME_AMPLITUDE, SAME_RATE, Loop, NotAvailable, same
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
 
@@ -51,6 +52,7 @@ def compare(evidences, claims: Claims | None = None, rope: float = ROPE, level: 
         "clear": CLEAR,
         "converged": all(e.converged for e in evidences),
         "pairs": pairs,
+        "overlays": _overlays(evidences, names),
         "mechanism": [_mechanism(e, name, level) for e, name in zip(evidences, names, strict=True)],
         "claims": answer(evidences, claims, seed) if claims else None,
         "units": [e.about for e in evidences],
@@ -81,11 +83,12 @@ def match(a: Evidence, b: Evidence) -> tuple[list[Matched], list[dict]]:
             pair = Matched(theirs, loop) if turned else Matched(loop, theirs)
             if not any(_alike(pair, f) for f in found):
                 found.append(pair)
-    return sorted(found, key=lambda m: (m.first.rate, m.first.amplitude)), refused
+    return sorted(found, key=lambda m: (-float(f"{m.first.amplitude:.2g}"), m.first.rate)), refused
 
 
 def _alike(one: Matched, other: Matched) -> bool:
-    return abs(one.first.rate / other.first.rate - 1) <= SAME_RATE and abs(one.first.amplitude / other.first.amplitude - 1) <= SAME_AMPLITUDE
+    a, b = one.first, other.first
+    return same(a.rate, b.rate, SAME_RATE) and same(a.amplitude, b.amplitude, SAME_AMPLITUDE)
 
 
 def _pair(i, j, names, evidences, rope, level, rng) -> dict:
@@ -124,7 +127,7 @@ def _indicators(a, b, matched, rope, level, rng):
 
 def _same_lost_motion(a, b):
     one, other = (e.about["k"] * e.rated_torque for e in (a, b))
-    if abs(one / other - 1) > SAME_AMPLITUDE:
+    if not same(one, other, SAME_AMPLITUDE):
         raise NotAvailable(f"lost motion was taken at ±{one:.3g} N·m and ±{other:.3g} N·m: give the same k·T_r")
 
 
@@ -163,6 +166,25 @@ def _verdict(greater, equivalent, less):
         if probability >= CLEAR:
             return word
     return "undecided"
+
+
+def _overlays(evidences, names) -> list[dict]:
+    """Conditions that two units or more were measured at, with the record of each."""
+    out: list[dict] = []
+    for evidence, name in zip(evidences, names, strict=True):
+        for loop in evidence.measured:
+            at = {"loading_rate_Nm_per_s": loop.rate, "amplitude_Nm": loop.amplitude}
+            place = next((o for o in out if _near(o, loop)), None)
+            if place is None:
+                out.append(place := at | {"units": []})
+            place["units"].append({"unit": name, "record": loop.records[0]})
+    shared = [o for o in out if len(o["units"]) > 1]
+    return sorted(shared, key=lambda o: (-float(f"{o['amplitude_Nm']:.2g}"), o["loading_rate_Nm_per_s"]))
+
+
+def _near(overlay, loop) -> bool:
+    rate, amplitude = overlay["loading_rate_Nm_per_s"], overlay["amplitude_Nm"]
+    return same(rate, loop.rate, SAME_RATE) and same(amplitude, loop.amplitude, SAME_AMPLITUDE)
 
 
 def _mechanism(evidence: Evidence, name: str, level: float) -> dict:

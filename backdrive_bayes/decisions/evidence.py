@@ -10,38 +10,12 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops, measured_loops
 from backdrive_bayes.decisions.prediction import LogError, error_between, shifted
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.indicators.draws import CORE, UNITS, indicator_draws
+from backdrive_bayes.indicators.draws import CORE, indicator_draws
 from backdrive_bayes.inference.fit import Posterior
 from backdrive_bayes.inference.posterior_file import read_group
-
-SAME_RATE = 0.1
-"""Relative difference up to which two loading rates are the same."""
-SAME_AMPLITUDE = 0.02
-"""Relative difference up to which two amplitudes are the same."""
-
-
-class NotAvailable(Exception):
-    """A loop or indicator that neither was measured nor can be predicted; its text says why."""
-
-
-@dataclass(frozen=True)
-class Loop:
-    """A settled loop by rate [N·m/s] and amplitude [N·m], and the numbers of the records that tell of it.
-
-    ``predicted`` is true where the amplitude lies within a larger measured one.
-    """
-
-    rate: float
-    amplitude: float
-    records: tuple[int, ...]
-    predicted: bool = False
-
-    @property
-    def text(self) -> str:
-        """In words."""
-        return f"{self.rate:.3g} N·m/s, ±{self.amplitude:.3g} N·m{' (predicted)' if self.predicted else ''}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,16 +80,7 @@ class Evidence:
     @cached_property
     def measured(self) -> tuple[Loop, ...]:
         """The measured loops in order of rate and amplitude; repeats of a record are one loop."""
-        rates, amplitudes = (self.draws[n].values for n in ("loading_rate_Nm_per_s", "amplitude_Nm"))
-        groups: list[list[int]] = []
-        for i in np.lexsort((amplitudes, rates)):
-            same = (g for g in groups if _same(rates, g[0], i, SAME_RATE) and _same(amplitudes, g[0], i, SAME_AMPLITUDE))
-            group = next(same, None)
-            if group is None:
-                groups.append([int(i)])
-            else:
-                group.append(int(i))
-        return tuple(Loop(float(rates[g].mean()), float(amplitudes[g].mean()), tuple(g)) for g in groups)
+        return measured_loops(self.draws["loading_rate_Nm_per_s"].values, self.draws["amplitude_Nm"].values)
 
     @property
     def rates(self) -> list[float]:
@@ -124,37 +89,11 @@ class Evidence:
 
     def largest(self) -> list[Loop]:
         """The loop of largest amplitude at every rate."""
-        best: list[Loop] = []
-        for loop in self.measured:
-            same = [i for i, b in enumerate(best) if abs(loop.rate / b.rate - 1) <= SAME_RATE]
-            if not same:
-                best.append(loop)
-            elif loop.amplitude > best[same[0]].amplitude:
-                best[same[0]] = loop
-        return best
+        return largest_loops(self.measured)
 
     def loop(self, rate: float, amplitude: float | None = None) -> Loop:
-        """The loop of that rate and amplitude (the largest measured one by default), predicted where it must be.
-
-        Raises NotAvailable for a rate that was not measured and for an amplitude beyond the measured one.
-        """
-        at_rate = [x for x in self.measured if abs(x.rate / rate - 1) <= SAME_RATE]
-        if not at_rate:
-            shown = ", ".join(f"{r:.3g}" for r in self.rates)
-            raise NotAvailable(f"rate {rate:.3g} N·m/s was not measured (only {shown} N·m/s) and rates cannot be predicted")
-        top = max(at_rate, key=lambda x: x.amplitude)
-        if amplitude is None:
-            return top
-        exact = [x for x in at_rate if abs(x.amplitude / amplitude - 1) <= SAME_AMPLITUDE]
-        if exact:
-            return min(exact, key=lambda x: abs(x.amplitude - amplitude))
-        if amplitude > top.amplitude:
-            measured = f"{top.amplitude:.3g} N·m at {top.rate:.3g} N·m/s"
-            raise NotAvailable(f"amplitude {amplitude:.3g} N·m lies beyond the measured {measured}")
-        lowest = float(self.draws["position_Nm"].values[top.records[0], 0])
-        if amplitude < lowest:
-            raise NotAvailable(f"amplitude {amplitude:.3g} N·m is below {lowest:.3g} N·m, the smallest that is predicted")
-        return Loop(top.rate, float(amplitude), top.records, True)
+        """The loop of that rate and amplitude; NotAvailable as ``find_loop`` says."""
+        return find_loop(self.measured, rate, amplitude)
 
     def values(self, name: str, loop: Loop, kept: bool = False) -> np.ndarray:
         """Draws of an indicator, shape (draws,); of the kept draws where ``kept`` or the loop is predicted.
@@ -232,15 +171,6 @@ class Evidence:
         a = self.draws.attrs
         found = {k: a[k].item() if hasattr(a[k], "item") else a[k] for k in ("data_sha256", "seed", "versions") if k in a}
         return found | {"model": self.about["model"], "folder": self.where}
-
-
-def known_indicator(name: str) -> bool:
-    """Whether limits, comparisons and claims may name it."""
-    return name in UNITS
-
-
-def _same(values, i, j, tolerance):
-    return abs(values[i] / values[j] - 1) <= tolerance
 
 
 def _json(path: Path, schema: str) -> dict:

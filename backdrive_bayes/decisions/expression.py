@@ -41,6 +41,7 @@ _OPERATORS = {
 }
 _SYMBOLS = {ast.Lt: "<", ast.LtE: "≤", ast.Gt: ">", ast.GtE: "≥"}
 _PLAIN = ("spread", "ratio_of_extremes", "linearity", "log_slope")
+_OTHER_UNITS = {"width_rad": "rad", "effect": "1", "sensitivity": "1", "least_squares": "1", "amplitude_Nm": "N·m"}
 _PLACES = ("at_lowest", "at_highest")
 _TRUTHS = ("rises", "falls", "one_valley", "double_humped")
 
@@ -171,7 +172,8 @@ def _run(node, look_up, along):
         return np.logical_not(value) if isinstance(node.op, ast.Not) else -value if isinstance(node.op, ast.USub) else value
     if isinstance(node, ast.BinOp):
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(_OPERATORS[type(node.op)](np.asarray(_run(node.left, look_up, along)), _run(node.right, look_up, along)))
+            left, right = (np.asarray(_run(n, look_up, along)) for n in (node.left, node.right))
+            return np.asarray(_OPERATORS[type(node.op)](left, right))
     sides = [_run(n, look_up, along) for n in (node.left, *node.comparators)]
     held = [_OPERATORS[type(op)](a, b) for op, a, b in zip(node.ops, sides[:-1], sides[1:], strict=True)]
     return np.logical_and.reduce(np.broadcast_arrays(*held))
@@ -202,7 +204,7 @@ def _unit(node) -> str:
     if isinstance(node, ast.Call):
         return _unit(node.func)
     if isinstance(node, ast.Attribute):
-        return {"width_rad": "rad", "effect": "1", "sensitivity": "1", "least_squares": "1", "amplitude_Nm": "N·m"}.get(node.attr, UNITS.get(node.attr, ""))
+        return (_OTHER_UNITS | UNITS).get(node.attr, "")
     if isinstance(node, ast.BinOp):
         sides = _unit(node.left), _unit(node.right)
         if isinstance(node.op, ast.Div) and _same_quantity(node.left, node.right):

@@ -26,7 +26,7 @@ MOST = 1.0
 
 
 def error_between(name: str, found, told):
-    """Error of a prediction ``told`` of the indicator ``name`` against ``found``, both (draws,): log ratio, or logits' difference."""
+    """Error of a prediction ``told`` of an indicator against ``found``, both (draws,): log ratio, or difference of logits."""
     return _logit(found) - _logit(told) if name == "dissipation_ratio" else np.log(found / told)
 
 
@@ -63,7 +63,7 @@ class LogError:
 
 
 def learnt_scale(at, error) -> float:
-    """Scale of the process from log errors (draws, loops) seen at log ratios (loops,), with ``WEIGHT`` loops of prior knowledge."""
+    """Scale of the process from log errors (draws, loops) seen at log ratios (loops,) and from prior knowledge."""
     free = 1 - _kernel(np.zeros(1), at)[0] ** 2
     seen = np.median(error, axis=0) ** 2 / np.maximum(free, 0.1)
     return float(np.sqrt((WEIGHT * SCALE**2 + seen.sum()) / (WEIGHT + seen.size)))

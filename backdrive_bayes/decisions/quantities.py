@@ -1,12 +1,13 @@
-"""A unit's quantities as a claim asks for them: arrays (draws, series), units paired at random, one unit's draws kept together."""
+"""A unit's quantities as a claim asks for them: arrays (draws, series), units paired at random."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.decisions.evidence import Evidence, Loop, NotAvailable
+from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.expression import Wrong
-from backdrive_bayes.indicators.draws import CORE, RESPONSES, UNITS
+from backdrive_bayes.decisions.loops import Loop, NotAvailable
+from backdrive_bayes.indicators.draws import CORE, RESPONSES
 
 PAIRINGS = 8
 _CLASSIC = ("r_squared", "rms_rad", "rms_high_load_over_rest")
@@ -17,10 +18,12 @@ class Quantities:
 
     def __init__(self, units: dict[str, Evidence], rng):
         self.units = units
-        fewest = min(e.kept.size for e in units.values())
+        self.fewest = min(e.kept.size for e in units.values())
         # Each unit's kept draws in the same number of random orders: units are independent, a unit's quantities are not.
-        self.order = {u: np.concatenate([rng.permutation(e.kept.size)[:fewest] for _ in range(PAIRINGS)]) for u, e in units.items()}
-        self.draws = fewest * PAIRINGS
+        self.order = {
+            u: np.concatenate([rng.permutation(e.kept.size)[:self.fewest] for _ in range(PAIRINGS)]) for u, e in units.items()
+        }
+        self.draws = self.fewest * PAIRINGS
 
     def within(self, claim, rates):
         """The coordinate of the claim's series (None without one), and the function that looks quantities up for it."""
@@ -53,9 +56,10 @@ class Quantities:
             return _named(evidence.parameters, arguments, "parameter")[evidence.kept][order][:, None]
         if method == "sensitivity":
             return self._sensitivity(evidence, arguments)
-        if method in ("least_squares", "effect"):
-            value = _classic(evidence, evidence.loop(rates[0]), arguments) if method == "least_squares" else _effect(evidence, arguments)
-            return np.full((self.draws, 1), value)
+        if method == "least_squares":
+            return np.full((self.draws, 1), _classic(evidence, evidence.loop(rates[0]), arguments))
+        if method == "effect":
+            return np.full((self.draws, 1), _effect(evidence, arguments))
         if method == "amplitude_Nm":
             fixed = np.array([evidence.loop(rates[0], claim.amplitude).amplitude])
             return np.tile(along if claim.along == "amplitude" else fixed, (self.draws, 1))
@@ -152,5 +156,3 @@ def _effect(evidence, arguments) -> float:
         raise NotAvailable(f"the diagnosis of {evidence.name} does not speak of {arguments[0]}")
     return float(found[arguments[0]])
 
-
-assert set(CORE) <= set(UNITS)

@@ -11,6 +11,8 @@ import numpy as np
 from backdrive_bayes.errors import BadInput
 
 INDICATORS = "backdrive-bayes/indicators/1"
+VERDICT = "backdrive-bayes/verdict/1"
+COMPARISON = "backdrive-bayes/comparison/1"
 
 
 def read_result(path: Path, schema: str) -> dict:

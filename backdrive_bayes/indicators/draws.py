@@ -117,13 +117,14 @@ def _humps(full):
 
 
 def _mechanism(posterior, record, torque, full):
-    """Areas of geometric error and friction, and the share of the absorbed energy that the elastic module takes up."""
+    """Areas of geometric error and friction, and the share of the absorbed energy that is given back."""
     modules = module_loops(posterior.problem, posterior.z, record, torque)
-    area, absorbed = ind.loop_area_j(full), ind.absorbed_j(full)
+    area = ind.loop_area_j(full)
     nothing = np.full(area.shape, np.nan)
     split = {f"S_{m[0]}_J": ind.loop_area_j(modules[m]) if m in modules else nothing for m in ("geometric", "friction")}
     split |= {f"S_{x}_over_S": split[f"S_{x}_J"] / area for x in "gf"}
-    split["elastic_share"] = ind.absorbed_j(modules["elastic"]) / absorbed if "elastic" in modules else nothing
+    # What a settled loop absorbs and does not dissipate was stored elastically and is given back.
+    split["elastic_share"] = 1 - area / ind.absorbed_j(full)
     return split
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.report import fit_section
+from backdrive_bayes.report import acceptance_section, comparison_section, fit_section
 from backdrive_bayes.report.blocks import Chapter
 
-SECTIONS = {"indicators.json": fit_section.chapter}
+SECTIONS = {
+    "verdict.json": acceptance_section.chapter,
+    "comparison.json": comparison_section.chapter,
+    "indicators.json": fit_section.chapter,
+}
 """Result file name → function that reads its folder and returns a chapter; chapters come in this order."""
 
 
