@@ -26,12 +26,12 @@ class Process:
     @cached_property
     def distribution(self):
         """The frozen scipy distribution."""
-        ratio2 = (self.sd / self.mean) ** 2 if self.mean else np.inf
+        if self.shape == "normal":
+            return stats.norm(self.mean, self.sd)
+        ratio2 = (self.sd / self.mean) ** 2
         if self.shape == "lognormal":
             return stats.lognorm(np.sqrt(np.log1p(ratio2)), scale=self.mean / np.sqrt(1 + ratio2))
-        if self.shape == "gamma":
-            return stats.gamma(1 / ratio2, scale=self.mean * ratio2)
-        return stats.norm(self.mean, self.sd)
+        return stats.gamma(1 / ratio2, scale=self.mean * ratio2)
 
     def to_json(self) -> dict:
         """As saved."""
