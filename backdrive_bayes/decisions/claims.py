@@ -126,6 +126,9 @@ def _ask(claim, units, quantities):
 def _number(claim, part, look_up, along, where):
     text, node, unit = part
     value = np.atleast_2d(np.asarray(claim.holds.run_part(node, look_up, along), float).T).T
+    if not np.isfinite(value).all():
+        # A comparison with NaN would be false and look like an answer.
+        raise NotAvailable(f"{text} is not defined in all draws")
     lo, median, hi = np.quantile(value, [0.05, 0.5, 0.95], axis=0)
     out = {"what": text, "at": where, "unit": unit, "level": 0.9}
     if value.shape[1] == 1:

@@ -1,7 +1,6 @@
 """Replicated data of a posterior: they must look like the data they come from."""
 
 import numpy as np
-import pytest
 from support.bench import unit_of
 from support.known import SCALE
 

@@ -98,7 +98,8 @@ def _about(name, loops, converged, k, effects):
     for record, (rate, amplitude) in zip(about["records"], loops, strict=True):
         record |= {"loading_rate_Nm_per_s": rate, "amplitude_Nm": amplitude}
         quality = {"r_squared": 0.999, "rms_rad": 3e-4, "rms_high_load_over_rest": 2.0}
-        record["least_squares"] = {"branches": {"ascending": quality, "descending": quality}, "indicators": {"loop_area_J": 3.0e-4}}
+        branches = {"ascending": quality, "descending": quality}
+        record["least_squares"] = {"branches": branches, "indicators": {"loop_area_J": 3.0e-4}}
     return about
 
 
