@@ -72,7 +72,7 @@ def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
         "specific_consumer_risk": together.consumer,
         "specific_producer_risk": together.producer,
         "limiting": {k: rows[limiting][k] for k in ("indicator", "loading_rate_Nm_per_s", "amplitude_Nm")},
-        "next": _next(structure, verdict, rows[limiting], limits),
+        "next": _next(structure, verdict, rows, limiting, limits),
         "limits": rows,
         "structure": structure.to_json(),
         "convergence": first.about["convergence"],
@@ -233,18 +233,17 @@ def _process(limit, row, batch):
     return process_of_batch(estimates, spreads), len(estimates)
 
 
-def _next(structure: Structure, verdict: Verdict, row: dict, limits: Limits) -> dict | None:
+def _next(structure: Structure, verdict: Verdict, rows: list[dict], limiting: int, limits: Limits) -> dict | None:
     if verdict is not Verdict.INCONCLUSIVE:
         return None
-    repeats = None
+    row, repeats = rows[limiting], None
     if not all(m.evidence.converged for m in structure.models):
         text = "Fit again with a longer budget (--budget); nothing needs to be measured for that."
     elif structure.unknown > min(limits.consumer, limits.producer):
         test = (structure.models[0].evidence.diagnosis or {}).get("next_test") or {}
         text = f"Explain the gap first. {test.get('do') or _EXPLAIN}"
     else:
-        part = 0.0 if row["model_error_share"] is None else row["model_error_share"]
-        repeats = repeats_to_settle(row["median"], row["sd"], part, row["min"], row["max"], limits.consumer, limits.producer)
+        repeats = None if row["predicted"] else repeats_to_settle(rows, limits.consumer, limits.producer)
         text = advice(row, repeats)
     return {
         "indicator": row["indicator"],

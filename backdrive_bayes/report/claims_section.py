@@ -24,8 +24,8 @@ def claims(result) -> list:
         Table(_COLUMNS, [_row(c) for c in found["claims"]], _WIDTHS),
         Note(
             f"“Holds” from a probability of {found['holds_from']:g}, “does not hold” up to {found['fails_below']:g}, “open” "
-            "between. Numbers: median [90 % interval] at the first rate asked; of a series the medians at its ends. Loops of "
-            "amplitudes that were not measured are predictions, widened by the error that measured ones show."
+            "between. Numbers: median [90 % interval] at the first rate asked; of a series the medians at its ends and its largest. "
+            "Loops of amplitudes that were not measured are predictions, widened by the error that measured ones show."
         ),
     ]
 
@@ -60,6 +60,9 @@ def _numbers(claim):
 def _number(number):
     factor, unit = display_unit(number["unit"])
     if isinstance(number["median"], list):
-        ends = " … ".join(significant(number["median"][i], 3, factor) for i in (0, -1))
-        return f"from {ends} {unit}".rstrip()
+        first, *_, last = number["median"]
+        ends = f"{significant(first, 3, factor)} to {significant(last, 3, factor)}"
+        top = max(number["median"])
+        over = f", at most {significant(top, 3, factor)}" if top > 1.05 * max(first, last) else ""
+        return f"{ends}{over} {unit}".rstrip()
     return f"{interval_text(number, factor)} {unit}".rstrip()

@@ -114,7 +114,7 @@ def _table(pair, condition, names):
             ]
         )
     columns = ["Indicator", free(pair["first"], 24), free(pair["second"], 24), "Ratio", "P(first larger)", "Verdict"]
-    return Table(columns, rows, [1.75, 1.3, 1.3, 1.35, 0.65, 0.8])
+    return Table(columns, rows, [1.6, 1.4, 1.4, 1.4, 0.6, 0.8])
 
 
 def _shown_unit(row):

@@ -52,7 +52,7 @@ def test_several_limits_are_kept_together_or_not():
     assert result["verdict"] == "inconclusive"
     alone = [r["conformance_probability"] for r in result["limits"]]
     assert result["conformance_probability"] == pytest.approx(math.prod(alone), abs=0.02)
-    assert "all together" in result["next"]["do"] or "Repeat" in result["next"]["do"]
+    assert result["next"]["repeats_in_all"] == 2 and "Repeat the records 1 time more" in result["next"]["do"]
 
 
 def test_the_limiting_indicator_is_the_least_sure_one():
@@ -148,11 +148,17 @@ def test_a_predicted_loop_is_to_be_measured():
 
 def test_repeats_that_would_settle():
     """One standard deviation away, nothing shared: accepted at z(0.95)² = 2.7, so with three records."""
-    assert repeats_to_settle(0.0, 1.0, 0.0, -math.inf, 1.0, 0.05, 0.1) == 3
-    assert repeats_to_settle(0.0, 1.0, 0.0, -math.inf, 5.0, 0.05, 0.1) == 1
-    assert repeats_to_settle(0.0, 1.0, 1.0, -math.inf, 1.0, 0.05, 0.1) is None, "model error does not repeat away"
-    assert repeats_to_settle(0.0, 1.0, 0.2, -math.inf, 1.0, 0.05, 0.1) > 3
-    assert repeats_to_settle(2.0, 1.0, 0.0, -math.inf, 1.9, 0.05, 0.1) is None, "on the limit nothing settles"
+
+
+    def needed(limit, share=0.0, rows=1):
+        row = {"median": 0.0, "sd": 1.0, "model_error_share": share, "min": -math.inf, "max": limit}
+        return repeats_to_settle([row] * rows, 0.05, 0.1)
+
+    assert needed(1.0) == 3 and needed(1.0, rows=3) > 3
+    assert needed(5.0) == 2, "one more at least"
+    assert needed(1.0, share=1.0) is None, "model error does not repeat away"
+    assert needed(1.0, share=0.2) > 3
+    assert needed(-0.1) is None, "on the limit nothing settles"
     text = judge(area(1.0))["next"]
     assert text["repeats_in_all"] == 4 and "3 times more" in text["do"]
     stuck = judge(area(0.5))
