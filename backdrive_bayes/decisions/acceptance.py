@@ -127,7 +127,7 @@ def _verdict(structure: Structure, risks: Risks, limits: Limits) -> tuple[Verdic
     bad = [m.evidence for m in structure.models if not m.evidence.converged]
     if bad:
         advised = bad[0].about["convergence"].get("advice") or "sample longer"
-        return Verdict.INCONCLUSIVE, f"the sampling has not converged: {advised}"
+        return Verdict.INCONCLUSIVE, f"the sampling has not converged: {advised.partition(': ')[2] or advised}"
     verdict = risks.verdict(limits.consumer, limits.producer)
     if verdict is Verdict.ACCEPTED:
         return verdict, f"the risk that it is out of limits, {_p(risks.consumer)}, is at most the agreed {_p(limits.consumer)}"

@@ -15,7 +15,7 @@ from backdrive_bayes.decisions.prediction import LogError, error_between, shifte
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import CORE, indicator_draws
 from backdrive_bayes.inference.fit import Posterior
-from backdrive_bayes.inference.posterior_file import read_group
+from backdrive_bayes.inference.posterior_file import attributes_of, read_group
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,8 @@ class Evidence:
         """From a posterior in memory and its indicators object."""
         physical = posterior.problem.physical(posterior.z)
         shared = {c.parameter.name: physical[:, i] for i, c in enumerate(posterior.problem.coordinates) if c.record is None}
-        return cls(about, indicator_draws(posterior, about["k"]), shared, where=posterior.unit.name)
+        draws = indicator_draws(posterior, about["k"])
+        return cls(about, draws.assign_attrs(attributes_of(posterior) | draws.attrs), shared)
 
     @property
     def name(self) -> str:
@@ -170,7 +171,7 @@ class Evidence:
         """Data hash, seed, versions and model of the fit."""
         a = self.draws.attrs
         found = {k: a[k].item() if hasattr(a[k], "item") else a[k] for k in ("data_sha256", "seed", "versions") if k in a}
-        return found | {"model": self.about["model"], "folder": self.where}
+        return found | {"model": self.about["model"], "folder": Path(self.where).name}
 
 
 def _json(path: Path, schema: str) -> dict:

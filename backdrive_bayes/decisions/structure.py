@@ -40,7 +40,7 @@ class Structure:
 
     def to_json(self) -> dict:
         """As saved."""
-        models = [m.evidence.about["model"] | {"probability": m.probability, "folder": m.evidence.where} for m in self.models]
+        models = [m.evidence.about["model"] | {"probability": m.probability} for m in self.models]
         return {
             "diagnosed": self.diagnosed,
             "models": models,

@@ -24,8 +24,8 @@ def claims(result) -> list:
         Table(_COLUMNS, [_row(c) for c in found["claims"]], _WIDTHS),
         Note(
             f"“Holds” from a probability of {found['holds_from']:g}, “does not hold” up to {found['fails_below']:g}, “open” "
-            "between. Numbers: median [90 % interval] at the first rate asked; of a series the medians at its ends and its largest. "
-            "Loops of amplitudes that were not measured are predictions, widened by the error that measured ones show."
+            "between. Numbers: median [90 % interval] at the first rate asked; of a series the medians at its ends and its "
+            "largest. Loops of amplitudes that were not measured are predictions, widened by the error that measured ones show."
         ),
     ]
 

@@ -65,7 +65,7 @@ def test_the_limiting_indicator_is_the_least_sure_one():
 def test_not_converged_is_inconclusive_whatever_the_numbers():
     for sds in (30, -30):
         result = judge(area(sds), e=evidence(converged=False))
-        assert result["verdict"] == "inconclusive" and "not converged" in result["reason"]
+        assert result["verdict"] == "inconclusive" and result["reason"] == "the sampling has not converged: give it more time"
         assert "--budget" in result["next"]["do"] and result["limits"][0]["verdict"] == "inconclusive"
 
 

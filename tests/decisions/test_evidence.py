@@ -1,12 +1,17 @@
 """Evidence is asked by rate and amplitude, survives its files, and says why it cannot answer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from support.bench import unit_of
 from support.decided import CHAINS, DRAWS, KEPT, LOOPS, TYPICAL, evidence, write_evidence
 
+from backdrive_bayes.commands.results import FitOptions, fit_unit, keep_fit
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops, measured_loops
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.indicators.draws import CORE, RESPONSES, UNITS
 
 WITH_SMALL = (*LOOPS, (0.05, 0.04))
 
@@ -62,6 +67,27 @@ def test_a_result_folder_holds_the_same_evidence(tmp_path):
     assert np.array_equal(again.values("loop_area_J", e.loop(0.05)), e.values("loop_area_J", e.loop(0.05)))
     assert np.array_equal(again.parameters["clearance"], e.parameters["clearance"])
     assert again.reproduction["seed"] == 7 and again.rated_torque == 0.1
+
+
+def test_a_real_fit_gives_the_same_evidence_in_memory_and_from_its_files(tmp_path):
+    """Loops and prediction, hash and seed included: a verdict does not depend on the way it was come by."""
+    unit = replace(unit_of(amplitudes=(0.1, 0.05)), data_hash="f" * 64)
+    posterior, about = fit_unit(unit, FitOptions(seconds=0.5, seed=3))
+    keep_fit(posterior, about, tmp_path, figures=False)
+    memory, file = Evidence.of(posterior, about), Evidence.read(tmp_path)
+    assert memory.measured == file.measured and len(memory.measured) == 2
+    for name in UNITS:
+        loop = memory.loop(0.05)
+        assert np.array_equal(memory.values(name, loop), file.values(name, loop)), name
+    small = memory.loop(0.05, 0.07)
+    assert small.predicted and np.array_equal(memory.values("loop_area_J", small), file.values("loop_area_J", small))
+    told = memory.reproduction | {"folder": tmp_path.name}
+    assert told == file.reproduction and told["data_sha256"] == "f" * 64 and told["seed"] == 3
+    table = about["records"][0]["indicators"]
+    for name in CORE:
+        assert np.median(memory.values(name, memory.loop(0.05))) == pytest.approx(table[name]["median"], rel=1e-5)
+    peak, sensed = RESPONSES.index("theta_L_rad"), [str(n) for n in memory.draws["parameter"].values]
+    assert (memory.draws["sensitivity"].values[:, peak, sensed.index("compliance")] > 0).all()
 
 
 def test_folders_that_are_none_are_one_clear_line(tmp_path):

@@ -94,7 +94,8 @@ def diagnosis(answer=(), **which):
 def _about(name, loops, converged, k, effects):
     about = indicators(len(loops)) | {"unit": name, "k": k}
     about["model"] = {"modules": ["geometric", "elastic", "friction"], "effects": list(effects)}
-    about["convergence"] |= {"converged": converged, "advice": "" if converged else "give it more time (--budget)"}
+    advice = "" if converged else "not converged within the budget: give it more time"
+    about["convergence"] |= {"converged": converged, "advice": advice}
     for record, (rate, amplitude) in zip(about["records"], loops, strict=True):
         record |= {"loading_rate_Nm_per_s": rate, "amplitude_Nm": amplitude}
         quality = {"r_squared": 0.999, "rms_rad": 3e-4, "rms_high_load_over_rest": 2.0}
