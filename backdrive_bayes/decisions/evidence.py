@@ -43,7 +43,7 @@ class Evidence:
         path = folder / "diagnosis.json"
         diagnosis = _json(path, "backdrive-bayes/diagnosis/1") if path.is_file() else None
         shared = {str(n): v.values.ravel() for n, v in posterior.items() if v.dims == ("chain", "draw")}
-        return cls(about, read_group(folder / "posterior.nc", "indicators"), shared, diagnosis, str(folder))
+        return cls(about, _indicator_group(folder / "posterior.nc"), shared, diagnosis, str(folder))
 
     @classmethod
     def of(cls, posterior: Posterior, about: dict) -> Evidence:
@@ -172,6 +172,14 @@ class Evidence:
         a = self.draws.attrs
         found = {k: a[k].item() if hasattr(a[k], "item") else a[k] for k in ("data_sha256", "seed", "versions") if k in a}
         return found | {"model": self.about["model"], "folder": Path(self.where).name}
+
+
+def _indicator_group(path: Path):
+    try:
+        return read_group(path, "indicators")
+    except BadInput as error:
+        found = "a posterior without them (fit the unit again with this version)"
+        raise BadInput(path, "a posterior.nc that holds draws of the indicators", found) from error
 
 
 def _json(path: Path, schema: str) -> dict:

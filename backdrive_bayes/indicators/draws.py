@@ -188,3 +188,6 @@ class _Moved:
     def values(self, physical, record):
         """Parameters of one record by name, as ``Problem.values`` gives them."""
         return self.problem._named(physical, record)
+
+    def __getattr__(self, name):
+        return getattr(self.problem, name)

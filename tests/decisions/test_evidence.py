@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.bench import unit_of
 from support.decided import CHAINS, DRAWS, KEPT, LOOPS, TYPICAL, evidence, write_evidence
+from support_results import write_result
 
 from backdrive_bayes.commands.results import FitOptions, fit_unit, keep_fit
 from backdrive_bayes.decisions.evidence import Evidence
@@ -99,4 +100,8 @@ def test_folders_that_are_none_are_one_clear_line(tmp_path):
         Evidence.read(folder)
     (folder / "posterior.nc").unlink()
     with pytest.raises(BadInput, match="posterior.nc"):
+        Evidence.read(folder)
+    write_result(folder, records=1)
+    (folder / "diagnosis.json").unlink()
+    with pytest.raises(BadInput, match="fit the unit again"):
         Evidence.read(folder)
