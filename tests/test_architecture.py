@@ -16,12 +16,14 @@ ORDER = (
     "model",
     "inference",
     "indicators",
+    "decisions",
     "bench",
     "gap",
     "blind",
     "figures",
     "report",
     "commands",
+    "api",
     "__main__",
 )
 """A room imports only from itself and from rooms to its left."""
@@ -31,8 +33,8 @@ FORBIDDEN = {
     "model": {"records"},
     "bench": {"inference", "indicators"},
     # A figure or a report is made from saved results and computes nothing.
-    "figures": {"records", "model", "inference", "indicators", "bench", "blind"},
-    "report": {"records", "model", "inference", "indicators", "bench", "blind"},
+    "figures": {"records", "model", "inference", "indicators", "decisions", "bench", "gap", "blind"},
+    "report": {"records", "model", "inference", "indicators", "decisions", "bench", "gap", "blind"},
 }
 HEAVY = ("matplotlib", "corner", "typst", "dask", "pyarrow", "nptdms")
 
@@ -136,9 +138,7 @@ def test_optional_libraries_stay_out_of_the_core(library):
 
 def loaded_after(statement):
     code = f"import sys; {statement}; print(*sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT.parent
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT.parent)
     return set(done.stdout.split())
 
 
@@ -157,12 +157,34 @@ def test_figures_and_reports_load_what_reads_results_and_no_more(module):
     assert "matplotlib" in loaded, "the subprocess must have loaded the figures for this to mean something"
 
 
+def test_importing_the_package_is_light():
+    loaded = loaded_after("import backdrive_bayes")
+    assert not loaded & {*HEAVY, "numpy", "scipy", "emcee", "xarray", "arviz_stats"}
+    assert "numpy" in loaded_after("import backdrive_bayes; backdrive_bayes.Unit")
+
+
+def test_decisions_load_no_optional_library():
+    modules = ", ".join(m for m in MODULES if room(m) == "decisions")
+    assert not loaded_after(f"import {modules}") & {*HEAVY}
+    assert not loaded_after("import backdrive_bayes.api") & {*HEAVY}
+
+
 def test_members_are_named_in_the_registry_only():
     """A new effect is one file and one line: nothing else imports a member's module."""
-    plumbing = {"hat_weights", "member", "parameter", "path", "play", "published", "reducer", "registry", "relaxation", "effects", ""}
-    members = {
-        m for m in MODULES if room(m) == "model" and (m.split(".") + [""])[2] not in plumbing or ".model.effects." in m
+    plumbing = {
+        "hat_weights",
+        "member",
+        "parameter",
+        "path",
+        "play",
+        "published",
+        "reducer",
+        "registry",
+        "relaxation",
+        "effects",
+        "",
     }
+    members = {m for m in MODULES if room(m) == "model" and (m.split(".") + [""])[2] not in plumbing or ".model.effects." in m}
     assert len(members) >= 15
     for member in members:
         assert {m for m in MODULES if member in own_imports(m)} <= {"backdrive_bayes.model.registry"}, member

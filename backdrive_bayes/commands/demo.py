@@ -5,11 +5,12 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from backdrive_bayes.commands import check, fit, report
+from backdrive_bayes.commands import accept, check, compare, fit, report
 from backdrive_bayes.commands.output import say
+from backdrive_bayes.commands.results import BASELINE
 from backdrive_bayes.errors import BadInput
 
-HELP = "check and fit the packaged twins and write one PDF"
+HELP = "check, fit, judge and compare the packaged twins and write one PDF"
 UNITS = ("reducer-1", "reducer-2")
 
 
@@ -19,7 +20,7 @@ def add_arguments(parser) -> None:
 
 
 def run(args) -> int:
-    """Run check and fit on every packaged unit, then the report; the worst exit code of the fits."""
+    """Run check, fit and accept on every packaged unit, compare them, then the report; the worst exit code of the fits."""
     out = args.out or Path("reports/demo")
     if not (args.data / UNITS[0]).is_dir():
         raise BadInput(args.data, "the folder of packaged units (run from the project's folder or give --data)", "none")
@@ -29,9 +30,13 @@ def run(args) -> int:
     for name in UNITS:
         folder = out / name
         check.run(Namespace(unit=args.data / name, out=folder, seed=args.seed))
-        defaults = {"baseline": "geometric,elastic,friction", "k": 0.03, "level": 0.9, "budget": 300.0}
-        defaults |= {"resume": False, "no_figures": False}
-        codes.append(fit.run(Namespace(unit=args.data / name, out=folder, seed=args.seed, **defaults)))
+        defaults = {"baseline": BASELINE, "k": 0.03, "level": 0.9, "budget": 300.0, "seed": args.seed, "no_figures": False}
+        codes.append(fit.run(Namespace(unit=args.data / name, out=folder, resume=False, **defaults)))
+        limits = args.data / "limits.toml"
+        accept.run(Namespace(unit=folder, out=folder, limits=limits, model=[], batch=[], **defaults))
         results.append(folder)
+    both = out / "comparison"
+    compare.run(Namespace(units=list(results), out=both, claims="paper", rope=0.05, **defaults))
+    results.append(both)
     report.run(Namespace(results=results, out=out, seed=args.seed))
     return max(codes)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.commands.output import default_out, progress, say, write_folder, write_json
-from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.commands.results import FitOptions, draw_figures, fit_unit, keep_fit, ready_unit
+from backdrive_bayes.errors import BadInput
 
 HELP = "find the unmodelled effect behind the gap between model and measurement"
 
@@ -23,48 +24,32 @@ def add_arguments(parser) -> None:
 def run(args) -> int:
     """Diagnose and write diagnosis.json, posterior.nc of the chosen model and figures; 0 done, 4 inconclusive."""
     from backdrive_bayes.gap.diagnose import diagnose
-    from backdrive_bayes.records.unit_folder import read_unit
 
     for name, value, top in (("--k", args.k, 1.0), ("--budget", args.budget, 1e7)):
         if not 0 < value < top:
             raise BadInput(name, f"a number between 0 and {top:g}", value)
-    unit, baseline = read_unit(args.unit), tuple(args.baseline.split(","))
+    (unit, _), baseline = ready_unit(args.unit), tuple(args.baseline.split(","))
     with progress() as note:
         found = diagnose(unit, baseline=baseline, seed=args.seed, k=args.k, progress=note)
-        posterior = None if args.no_posterior else _sample(unit, baseline, found, args, note)
+        sampled = None if args.no_posterior else _sample(unit, baseline, found, args, note)
     result = found.json
-    if posterior is not None:
-        result["convergence"] = posterior.convergence.to_json()
+    if sampled is not None:
+        result["convergence"] = sampled[0].convergence.to_json()
     out = args.out or default_out(unit.name, "diagnose")
     with write_folder(out) as folder:
         write_json(folder / "diagnosis.json", result)
-        if posterior is not None:
-            from backdrive_bayes.inference.posterior_file import write_posterior
-
-            write_posterior(posterior, folder / "posterior.nc")
+        if sampled is not None:
+            keep_fit(*sampled, folder, figures=False)
         if not args.no_figures:
-            _draw(folder)
+            draw_figures("save_figures", folder)
     _summarise(result, out)
     return 4 if result["inconclusive"] else 0
 
 
 def _sample(unit, baseline, found, args, note):
-    from backdrive_bayes.indicators.summary import monitored
-    from backdrive_bayes.inference.fit import fit
-    from backdrive_bayes.inference.sampling import Settings
-
+    """The model with what was named, sampled: posterior and indicators object."""
     model = (*baseline, *(e for e in found.effects if e not in baseline))
-    settings = Settings(max_seconds=args.budget)
-    return fit(unit, baseline=model, seed=args.seed, settings=settings, quantities=monitored(args.k), progress=note)
-
-
-def _draw(folder: Path) -> None:
-    try:
-        from backdrive_bayes.figures.catalogue import save_figures
-    except MissingExtra as missing:
-        say(f"no figures: {missing}")
-    else:
-        save_figures(folder, folder / "figures")
+    return fit_unit(unit, FitOptions(model, k=args.k, seconds=args.budget, seed=args.seed), note)
 
 
 def _summarise(result: dict, out: Path) -> None:
@@ -73,7 +58,8 @@ def _summarise(result: dict, out: Path) -> None:
     else:
         top = ", ".join(f"{row['effect']} {row['probability']:.2f}" for row in result["which"][:3])
         say(f"{result['unit']}: gap with probability {result['gap']['probability']:.2f}; {top}")
-        say(f"  answer: {' + '.join(result['answer']['effects']) or 'none'}; 90 % set: {', '.join(result['answer']['credible_set_90'])}")
+        named, chosen = " + ".join(result["answer"]["effects"]) or "none", ", ".join(result["answer"]["credible_set_90"])
+        say(f"  answer: {named}; 90 % set: {chosen}")
         say(f"  where: {result['where']['summary']}")
         closed = result["shrink"]["closed_fraction"]
         say(f"  closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.commands.output import default_out, progress, say, write_folder, write_json
-from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.commands.output import default_out, progress, say, write_folder
+from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, fit_unit, keep_fit, ready_unit
 
 CHAIN = "chain.h5"
 ARCMIN = 10800.0 / 3.141592653589793
@@ -15,71 +15,31 @@ HELP = "infer a unit's parameters and indicators, with credible intervals"
 def add_arguments(parser) -> None:
     """Options of this verb."""
     parser.add_argument("unit", type=Path, metavar="UNIT", help="unit folder or a bare record file")
-    parser.add_argument("--baseline", default="geometric,elastic,friction", help="modules of the model, comma-separated")
-    parser.add_argument("--k", type=float, default=0.03, help="share of T_r at which lost motion is taken (default 0.03)")
-    parser.add_argument("--level", type=float, default=0.9, help="level of the central intervals (default 0.9)")
-    parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS", help="stop sampling after this time")
+    add_fit_arguments(parser)
     parser.add_argument("--resume", action="store_true", help="go on with the fit in OUT whose budget ran out")
-    parser.add_argument("--no-figures", action="store_true", help="write no figures")
 
 
 def run(args) -> int:
     """Fit and write posterior.nc, indicators.json and figures; 0 done, 4 not converged, then with chain.h5 to resume from."""
-    from backdrive_bayes.indicators.least_squares import least_squares_json
-    from backdrive_bayes.indicators.summary import indicators_json, monitored
     from backdrive_bayes.inference.chain_file import read_chain, write_chain
-    from backdrive_bayes.inference.fit import fit
-    from backdrive_bayes.inference.posterior_file import write_posterior
-    from backdrive_bayes.inference.sampling import Settings
-    from backdrive_bayes.records.check import check_unit
-    from backdrive_bayes.records.faults import without_wild
-    from backdrive_bayes.records.unit_folder import read_unit
 
-    for name, value, top in (("--k", args.k, 1.0), ("--level", args.level, 1.0), ("--budget", args.budget, 1e7)):
-        if not 0 < value < top:
-            raise BadInput(name, f"a number between 0 and {top:g}", value)
-    unit = without_wild(read_unit(args.unit))
-    faults = [m["text"] for m in check_unit(unit)["messages"] if m["level"] != "info"]
+    options = FitOptions.of(args)
+    unit, faults = ready_unit(args.unit)
     for fault in faults:
         say(f"warning: {fault}")
-    baseline = tuple(args.baseline.split(","))
     out = args.out or default_out(unit.name, "fit")
-    resume = read_chain(out / CHAIN, unit, baseline, args.seed) if args.resume else None
+    resume = read_chain(out / CHAIN, unit, options.baseline, options.seed) if args.resume else None
     with progress() as note:
-        posterior = fit(
-            unit,
-            baseline=baseline,
-            seed=args.seed,
-            settings=Settings(max_seconds=args.budget),
-            quantities=monitored(args.k),
-            resume=resume,
-            progress=note,
-        )
-    result = indicators_json(posterior, args.k, args.level)
-    for record, own in zip(result["records"], unit.records, strict=True):
-        record["least_squares"] = least_squares_json(own, unit.rated_torque_nm, args.k)
-    result["identity"] = dict(unit.identity)
-    result["notes"] = [*unit.notes, *(f"{r.name}: {note}" for r in unit.records for note in r.notes), *faults]
+        posterior, result = fit_unit(unit, options, note, resume)
+    result["notes"] += faults
     with write_folder(out) as folder:
-        write_json(folder / "indicators.json", result)
-        write_posterior(posterior, folder / "posterior.nc")
-        if not args.no_figures:
-            _draw(folder)
+        keep_fit(posterior, result, folder, not args.no_figures)
         if not posterior.converged:
             write_chain(posterior, folder / CHAIN)
     if posterior.converged:
         (out / CHAIN).unlink(missing_ok=True)
     _summarise(result, out)
     return 0 if posterior.converged else 4
-
-
-def _draw(folder: Path) -> None:
-    try:
-        from backdrive_bayes.figures.catalogue import save_figures
-    except MissingExtra as missing:
-        say(f"no figures: {missing}")
-    else:
-        save_figures(folder, folder / "figures")
 
 
 def _summarise(result: dict, out: Path) -> None:

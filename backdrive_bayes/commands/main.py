@@ -13,15 +13,15 @@ from backdrive_bayes.errors import BadInput, MissingExtra
 VERBS = {
     "check": "check",
     "fit": "fit",
+    "compare": "compare",
+    "accept": "accept",
     "predict": "predict",
     "simulate": "simulate",
     "blind": "blind",
     "report": "report",
     "demo": "demo",
 }
-_DESCRIPTION = (
-    "Bayesian inference of a robot reducer's geometric error, stiffness and friction from torque-angle loops."
-)
+_DESCRIPTION = "Bayesian inference of a robot reducer's geometric error, stiffness and friction from torque-angle loops."
 
 
 class _Usage(Exception):
@@ -62,12 +62,12 @@ def _parser(argv: list[str]) -> argparse.ArgumentParser:
     asked = next((word for word in argv if not word.startswith("-")), None)
     for verb in [asked] if asked in VERBS else VERBS:
         module = importlib.import_module(f"backdrive_bayes.commands.{VERBS[verb]}")
-        own = verbs.add_parser(verb, help=module.HELP.replace("%", "%%"), description=module.HELP.replace("%", "%%"), allow_abbrev=False)
+        own = verbs.add_parser(
+            verb, help=module.HELP.replace("%", "%%"), description=module.HELP.replace("%", "%%"), allow_abbrev=False
+        )
         module.add_arguments(own)
         own.add_argument("-o", "--out", type=Path, metavar="OUT", help="folder to write into")
-        own.add_argument(
-            "--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers (default 0)"
-        )
+        own.add_argument("--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers (default 0)")
         own.set_defaults(run=module.run)
     return parser
 

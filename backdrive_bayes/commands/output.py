@@ -36,6 +36,13 @@ def complain(error: Exception | str) -> None:
     _write(sys.stderr, "backdrive-bayes: " + " ".join(str(error).split()))
 
 
+def probability_text(probability: float) -> str:
+    """A probability with three digits, never rounded to certainty."""
+    if probability > 0.999:
+        return "above 0.999"
+    return "below 0.001" if probability < 0.001 else f"{probability:.3g}"
+
+
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
     """Yield ``note(text)``: one line redrawn on a terminal, elsewhere plain lines every few seconds."""

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.figures import amplitude, corner_plot, diagnosis, loop, modules, predictive, torque_energy, trace
+from backdrive_bayes.figures import (
+    acceptance,
+    amplitude,
+    comparison,
+    corner_plot,
+    diagnosis,
+    loop,
+    modules,
+    predictive,
+    torque_energy,
+    trace,
+)
 from backdrive_bayes.figures.diagnosis_saved import FILE as DIAGNOSIS
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import PER_FIGURE, SERIES, Figure, styled
+from backdrive_bayes.results import COMPARISON, VERDICT, read_result
 
 CAPTIONS = {
     "loop": loop.CAPTION,
@@ -19,6 +31,11 @@ CAPTIONS = {
     "trace": trace.CAPTION,
     "predictive": predictive.CAPTION,
     **diagnosis.CAPTIONS,
+    "acceptance": acceptance.CAPTION,
+    "comparison-loops": comparison.LOOPS,
+    "comparison-energy": comparison.ENERGY,
+    "comparison-ratios": comparison.RATIOS,
+    "comparison-mechanism": comparison.MECHANISM,
 }
 PNG_DPI = 150
 
@@ -50,6 +67,22 @@ def figures_of(saved: Saved) -> dict[str, Figure]:
     return out
 
 
+def verdict_figures(verdict: dict) -> dict[str, Figure]:
+    """The figures of a verdict object: acceptance, acceptance-2, …"""
+    return _split("acceptance", acceptance.draw, verdict, list(range(len(verdict["limits"]))), acceptance.AT_MOST)
+
+
+def comparison_figures(result: dict) -> dict[str, Figure]:
+    """The figures of a comparison object."""
+    overlays = list(range(len(result["overlays"])))
+    out = _split("comparison-loops", comparison.draw_loops, result, overlays, PER_FIGURE)
+    out |= _split("comparison-energy", comparison.draw_energy, result, overlays, PER_FIGURE)
+    pairs = [i for i, p in enumerate(result["pairs"]) if p["conditions"]]
+    for n, i in enumerate(pairs, 1):
+        out["comparison-ratios" if n == 1 else f"comparison-ratios-{n}"] = comparison.draw_ratios(result, i)
+    return out | {"comparison-mechanism": comparison.draw_mechanism(result)}
+
+
 def _split(name, draw, saved, records, at_most):
     parts = [records[i : i + at_most] for i in range(0, len(records), at_most)]
     return {name if i == 0 else f"{name}-{i + 1}": draw(saved, part) for i, part in enumerate(parts)}
@@ -57,9 +90,23 @@ def _split(name, draw, saved, records, at_most):
 
 def save_figures(folder: Path, out: Path) -> list[Path]:
     """Write every figure of ``folder`` into ``out`` as .svg and .png; equal results give equal bytes."""
+    return _save(all_figures(folder), out)
+
+
+def save_verdict_figures(folder: Path, out: Path) -> list[Path]:
+    """The same for the verdict in ``folder``."""
+    return _save(verdict_figures(read_result(Path(folder) / "verdict.json", VERDICT)), out)
+
+
+def save_comparison_figures(folder: Path, out: Path) -> list[Path]:
+    """The same for the comparison in ``folder``."""
+    return _save(comparison_figures(read_result(Path(folder) / "comparison.json", COMPARISON)), out)
+
+
+def _save(figures, out):
     out.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, figure in all_figures(folder).items():
+    for name, figure in figures.items():
         written += [save_svg(figure, out / f"{name}.svg"), _save_png(figure, out / f"{name}.png")]
     return written
 

@@ -116,6 +116,31 @@ def display_unit(unit: str) -> tuple[float, str]:
     return DISPLAY_UNITS.get(unit, (1.0, unit))
 
 
+INDICATOR_WORDS = {
+    "lost_motion_rad": "lost motion δ",
+    "zero_torque_width_rad": "width at zero torque w(0)",
+    "peak_angle_rad": "peak angle",
+    "loop_area_J": "dissipated energy S",
+    "absorbed_J": "absorbed energy W_abs",
+    "dissipation_ratio": "dissipation ratio u",
+    "tau1_Nm": "τ₁",
+    "tau2_Nm": "τ₂",
+    "hump_torque_Nm": "torque of the hump",
+    "S_g_J": "energy of geometric error S_g",
+    "S_f_J": "energy of friction S_f",
+    "S_g_over_S": "S_g/S",
+    "S_f_over_S": "S_f/S",
+    "elastic_share": "elastic share of W_abs",
+    "theta_L_rad": "angle turned θ_L",
+    "W_L_J": "energy at load W_L",
+}
+
+
+def indicator_words(name: str) -> str:
+    """An indicator's name in words, with its symbol."""
+    return INDICATOR_WORDS.get(name, words(name))
+
+
 def words(name: str) -> str:
     """A parameter's or module's name in words."""
     return name.replace("_", " ")

@@ -112,7 +112,10 @@ def _weigh(setting, fitted):
 
 def _unexplained(setting, fitted):
     small = ("misfit", MISFIT_LENGTH, 0.3)
-    return [[log_evidence(setting, fitted, small, (kind, length, level)) for level in UNKNOWN_LEVELS] for kind, length in UNKNOWN_KINDS]
+    return [
+        [log_evidence(setting, fitted, small, (kind, length, level)) for level in UNKNOWN_LEVELS]
+        for kind, length in UNKNOWN_KINDS
+    ]
 
 
 def _promising_pairs(none, singles, screens, whitening):

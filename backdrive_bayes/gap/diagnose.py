@@ -32,7 +32,13 @@ class Diagnosis:
 
 
 def diagnose(
-    unit: Unit, *, baseline=BASELINE, seed: int = 0, allowed=None, k: float = 0.03, progress: Callable[[str], None] = lambda text: None
+    unit: Unit,
+    *,
+    baseline=BASELINE,
+    seed: int = 0,
+    allowed=None,
+    k: float = 0.03,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Where model and measurement part, which effect causes it, how far the gap shrinks with it.
 
@@ -95,7 +101,11 @@ class _Found:
             "k": self.k,
             "inconclusive": "",
             "records": [
-                {"file": d.blocks.name, "loading_rate_Nm_per_s": loading_rate_nm_per_s(d), "amplitude_Nm": amplitudes[d.blocks.name]}
+                {
+                    "file": d.blocks.name,
+                    "loading_rate_Nm_per_s": loading_rate_nm_per_s(d),
+                    "amplitude_Nm": amplitudes[d.blocks.name],
+                }
                 for d in records
             ],
             "gap": self._gap(gap),

@@ -22,7 +22,9 @@ class Places:
         self.phase = np.concatenate([c.phase(d.path.torque_nm, d.path.direction) for c, d in zip(coordinates, data, strict=True)])
         self.record = np.concatenate([np.full(d.blocks.count.size, r) for r, d in enumerate(data)])
         self.first = np.concatenate([d.blocks.leg == 0 for d in data])
-        self.time = np.concatenate([(d.blocks.mid_s - d.blocks.begin_s[0]) / (d.blocks.end_s[-1] - d.blocks.begin_s[0]) for d in data])
+        self.time = np.concatenate(
+            [(d.blocks.mid_s - d.blocks.begin_s[0]) / (d.blocks.end_s[-1] - d.blocks.begin_s[0]) for d in data]
+        )
         amplitude = np.array([amplitude_nm(problem, r) for r in range(len(data))])
         self.same_loop = np.abs(np.log(amplitude[:, None] / amplitude)) < SAME_LOOP
         span = np.array([np.ptp(d.blocks.angle_rad) for d in data])
@@ -43,7 +45,7 @@ class Places:
         return self._scaled(share * common * np.exp(-apart / length))
 
     def shape(self, length: float) -> np.ndarray:
-        """Function of the place on the loop with smooth and sharp parts, half of it common to all records, half each one's own."""
+        """Function of the place on the loop with smooth and sharp parts, half of it common to all records."""
         apart = np.abs(self.phase[:, None] - self.phase)
         apart = np.sqrt(3) * np.minimum(apart, 1 - apart) / length
         smooth, sharp = ((1 + d) * np.exp(-d) for d in (apart, SHARP * apart))

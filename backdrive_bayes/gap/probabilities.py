@@ -58,7 +58,10 @@ def _slow(candidates, c):
     singles = [w for w in candidates.weighed if len(w.effects) == 1]
     possible = len(singles) * (len(singles) - 1) / 2
     share = {0: c.none, 1: c.single / max(len(singles), 1), 2: c.pair / max(possible, 1)}
-    score = {tuple(sorted(w.effects)): np.log(share[len(w.effects)]) + logsumexp(w.log_evidence + misfit) / c.temperature for w in candidates.weighed}
+    score = {
+        tuple(sorted(w.effects)): np.log(share[len(w.effects)]) + logsumexp(w.log_evidence + misfit) / c.temperature
+        for w in candidates.weighed
+    }
     kinds = candidates.unexplained.shape[1]
     with np.errstate(divide="ignore"):
         levels = np.log([c.unknown_level, c.beside_level])[:, None, :]

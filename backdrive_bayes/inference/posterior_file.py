@@ -14,11 +14,12 @@ from backdrive_bayes.results import POSTERIOR
 PREDICTIVE_PER_ENSEMBLE = 50
 
 
-def write_posterior(posterior: Posterior, path: Path) -> None:
+def write_posterior(posterior: Posterior, path: Path, more: dict | None = None) -> None:
     """Write the groups posterior, unconstrained_posterior, sample_stats, log_likelihood, posterior_predictive,
-    observed_data and constant_data; angles in rad, torques in N·m.
+    observed_data and constant_data; angles in rad, torques in N·m. ``more`` are further datasets by group name.
     """
-    groups = posterior_groups(posterior)
+    extra = {name: dataset.assign_attrs(attributes_of(posterior) | dataset.attrs) for name, dataset in (more or {}).items()}
+    groups = posterior_groups(posterior) | extra
     mode = "w"
     for name, dataset in groups.items():
         encoding = {v: {"zlib": True, "complevel": 1} for v in dataset.data_vars if dataset[v].dtype.kind == "f"}
@@ -31,7 +32,7 @@ def posterior_groups(posterior: Posterior) -> dict:
     import xarray
 
     problem = posterior.problem
-    attributes = _attributes(posterior)
+    attributes = attributes_of(posterior)
     records = [d.blocks.name for d in problem.records]
     block_record = np.concatenate([np.full(d.blocks.count.size, r) for r, d in enumerate(problem.records)])
     coords = {"record": records, "coordinate": list(problem.labels)}
@@ -58,7 +59,8 @@ def posterior_groups(posterior: Posterior) -> dict:
     }
 
 
-def _attributes(posterior):
+def attributes_of(posterior: Posterior) -> dict:
+    """What every group says of the fit: schema, unit, data hash, model, seed, convergence and versions."""
     problem, discrepancy = posterior.problem, posterior.discrepancy
     packages = ("backdrive-bayes", "numpy", "scipy", "emcee", "arviz")
     return {

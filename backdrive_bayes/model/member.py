@@ -34,8 +34,8 @@ class Stage(enum.IntEnum):
 class Drive:
     """What a member sees.
 
-    The path that is read and T_r; ``transmitted_nm`` (…, samples), the torque that reaches the elastic parts; ``shift_nm`` (scalar
-    or (…, 1)), the error of the torque reading; ``angle_rad`` (…, samples), the angle before the angle channel.
+    The path that is read and T_r; ``transmitted_nm`` (…, samples), the torque that reaches the elastic parts; ``shift_nm``
+    (scalar or (…, 1)), the error of the torque reading; ``angle_rad`` (…, samples), the angle before the angle channel.
     """
 
     path: TorquePath

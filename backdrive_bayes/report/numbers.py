@@ -63,6 +63,15 @@ def percent(share: float | None) -> str:
     return "–" if share is None else f"{100 * share:.3g} %" if share < 0.01 else f"{100 * share:.0f} %"
 
 
+def probability_text(probability: float | None) -> str:
+    """A probability with two decimals, three near 0 and 1, never rounded to certainty."""
+    if probability is None:
+        return "–"
+    if probability > 0.999 or probability < 0.001:
+        return "> 0.999" if probability > 0.5 else "< 0.001"
+    return f"{probability:.3f}" if probability > 0.9 or probability < 0.1 else f"{probability:.2f}"
+
+
 def level_text(level: float) -> str:
     """The level of intervals as per cent."""
     return f"{100 * level:.3g} %"

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.report import blind_section, diagnosis_section, fit_section
+from backdrive_bayes.report import acceptance_section, blind_section, comparison_section, diagnosis_section, fit_section
 from backdrive_bayes.report.blocks import Chapter
 
 SECTIONS = {
+    "verdict.json": acceptance_section.chapter,
+    "comparison.json": comparison_section.chapter,
     "indicators.json": fit_section.chapter,
     "diagnosis.json": diagnosis_section.chapter,
     "blind.json": blind_section.chapter,

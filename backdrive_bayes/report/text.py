@@ -10,7 +10,7 @@ UNBREAKABLE = 36
 BREAK = "\u200b"
 LOW, END = "\ue000", "\ue001"
 """Marks around an index; free text cannot hold them, because :func:`printable` spells them out."""
-_SYMBOLS = re.compile(r"(?<![A-Za-z])(k?[WSTθτ])_(abs|g|f|r|L)(?![A-Za-z])")
+_SYMBOLS = re.compile(r"(?<![A-Za-z])(k?[WSTθτ]|p)_(abs|g|f|r|L|c)(?![A-Za-z])")
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
 

@@ -19,8 +19,8 @@ from backdrive_bayes.bench.known_truth import BenchNoise, ramp
 from backdrive_bayes.inference.covariance import block_covariance
 from backdrive_bayes.inference.fit import corrected_blocks
 from backdrive_bayes.inference.optimum import find_optimum, laplace
-from backdrive_bayes.inference.starts import screened_starts
 from backdrive_bayes.inference.problem import RecordData
+from backdrive_bayes.inference.starts import screened_starts
 from backdrive_bayes.model.path import TorquePath
 
 NOISE = BenchNoise(torque_nm=1e-12)

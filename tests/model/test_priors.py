@@ -6,7 +6,6 @@ from scipy.stats import binom, kstest, lognorm, loguniform, norm, uniform
 from support.known import SCALE, reducer
 
 from backdrive_bayes.model.parameter import BoundedLogNormal, LogNormal, LogUniform, Normal, Parameter, Uniform
-
 from backdrive_bayes.model.registry import MEMBERS
 
 PRIORS = {p.name: p.scaled_prior(SCALE) for p in reducer(MEMBERS).parameters}

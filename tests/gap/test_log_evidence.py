@@ -29,7 +29,9 @@ def hypothesis(seed=0, columns=2, contributions=()):
     jacobian = rng.normal(size=(N, columns))
     residual = rng.normal(size=N)
     problem = SimpleNamespace(noise_dof=1e9, dof=N - 2)
-    return SimpleNamespace(z=np.zeros(columns), residual=residual, jacobian=jacobian, problem=problem, contributions=contributions)
+    return SimpleNamespace(
+        z=np.zeros(columns), residual=residual, jacobian=jacobian, problem=problem, contributions=contributions
+    )
 
 
 def brute_force(fitted, covariance):

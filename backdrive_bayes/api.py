@@ -1,0 +1,197 @@
+"""The Python interface: the verbs as functions whose results show themselves and can be saved."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+
+from backdrive_bayes.commands.output import probability_text, write_folder, write_json
+from backdrive_bayes.commands.results import FitOptions, draw_figures, fit_unit, is_result, keep_fit
+from backdrive_bayes.decisions.acceptance import assess
+from backdrive_bayes.decisions.claims import read_claims
+from backdrive_bayes.decisions.comparison import ROPE
+from backdrive_bayes.decisions.comparison import compare as compare_evidence
+from backdrive_bayes.decisions.evidence import Evidence
+from backdrive_bayes.decisions.limits import Limits, read_limits
+from backdrive_bayes.records import record
+from backdrive_bayes.records.unit_folder import read_unit
+
+
+class Unit(record.Unit):
+    """A reducer and its records; see :meth:`read`."""
+
+    @classmethod
+    def read(cls, path: Path | str) -> Unit:
+        """The unit in a folder with unit.toml, or of one bare record file; BadInput says what is wrong with it."""
+        unit = read_unit(path)
+        return cls(**{f.name: getattr(unit, f.name) for f in fields(unit)})
+
+    def _repr_html_(self):
+        records = "".join(f"<li>{html.escape(r.name)}: {r.time_s.size} samples</li>" for r in self.records)
+        return f"<b>{html.escape(self.name)}</b>, rated torque {self.rated_torque_nm:.4g} N·m<ul>{records}</ul>"
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A posterior and its indicators object, of indicators.json's form."""
+
+    posterior: object
+    indicators: dict
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """The draws that decisions rest on."""
+        return Evidence.of(self.posterior, self.indicators)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every parameter and indicator passed the diagnostics."""
+        return bool(self.indicators["convergence"]["converged"])
+
+    def save(self, folder: Path | str, figures: bool = True) -> Path:
+        """Write indicators.json, posterior.nc and figures, as the verb ``fit`` does."""
+        with write_folder(folder) as room:
+            keep_fit(self.posterior, self.indicators, room, figures)
+        return Path(folder)
+
+    def _repr_html_(self):
+        names = list(self.indicators["records"][0]["indicators"])
+        rows = [[r["file"], *(_interval(r["indicators"][n]) for n in names)] for r in self.indicators["records"]]
+        state = "converged" if self.converged else "NOT converged"
+        return _title(self.indicators["unit"], state) + _table(["record", *names], rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """A verdict object, of verdict.json's form."""
+
+    result: dict
+
+    @property
+    def verdict(self) -> str:
+        """accepted, rejected or inconclusive."""
+        return self.result["verdict"]
+
+    def save(self, folder: Path | str, figures: bool = True) -> Path:
+        """Write verdict.json and its figures, as the verb ``accept`` does."""
+        return _save(self.result, "verdict.json", "save_verdict_figures", folder, figures)
+
+    def __str__(self):
+        return f"{self.result['unit']}: {self.verdict}; {self.result['reason']}"
+
+    def _repr_html_(self):
+        rows = [
+            [r["indicator"], f"{r['loading_rate_Nm_per_s']:.3g}", f"{r['amplitude_Nm']:.3g}", _between(r), _interval(r),
+             probability_text(r["conformance_probability"]), r["verdict"]]
+            for r in self.result["limits"]
+        ]  # fmt: skip
+        names = ["indicator", "rate [N·m/s]", "amplitude [N·m]", "limits", "posterior", "conformance", "verdict"]
+        advice = f"<p>{html.escape(self.result['next']['do'])}</p>" if self.result["next"] else ""
+        return _title(self.result["unit"], f"{self.verdict}; {self.result['reason']}") + _table(names, rows) + advice
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A comparison object, of comparison.json's form."""
+
+    result: dict
+
+    @property
+    def claims(self) -> list[dict]:
+        """The answered claims, none where none were asked."""
+        return (self.result["claims"] or {}).get("claims", [])
+
+    def save(self, folder: Path | str, figures: bool = True) -> Path:
+        """Write comparison.json and its figures, as the verb ``compare`` does."""
+        return _save(self.result, "comparison.json", "save_comparison_figures", folder, figures)
+
+    def _repr_html_(self):
+        out = _title("Comparison of " + ", ".join(self.result["names"]), f"ratios with {self.result['level']:.0%} intervals")
+        for pair in self.result["pairs"]:
+            rows = [
+                [f"{c['loading_rate_Nm_per_s']:.3g}", f"{c['amplitude_Nm']:.3g}", name, _interval(r["ratio"]),
+                 probability_text(r["probability_first_greater"]), r["verdict"]]
+                for c in pair["conditions"] for name, r in c["indicators"].items()
+            ]  # fmt: skip
+            ratio = f"{pair['first']} / {pair['second']}"
+            out += _table(["rate [N·m/s]", "amplitude [N·m]", "indicator", ratio, "P(first larger)", "verdict"], rows)
+        if self.claims:
+            rows = [[c["id"], c["claim"], _probability(c["probability"]), c["verdict"]] for c in self.claims]
+            out += _table(["no.", "claim", "probability", "verdict"], rows)
+        return out
+
+
+def fit(unit, *, k: float = 0.03, level: float = 0.9, seed: int = 0, budget: float = 120.0, baseline=None, progress=None) -> Fit:
+    """Posterior and indicators of a unit (or of the path of one); ``budget`` in seconds, ``progress`` is told where it stands."""
+    given = {} if baseline is None else {"baseline": tuple(baseline)}
+    unit = unit if isinstance(unit, record.Unit) else Unit.read(unit)
+    return Fit(*fit_unit(unit, FitOptions(k=k, level=level, seconds=budget, seed=seed, **given), progress or (lambda text: None)))
+
+
+def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
+    """The verdict on a fitted unit against limits (a file or :class:`Limits`).
+
+    ``fitted`` is a fit, the folder of one, or a list of fits of one unit under several models with their ``probabilities``;
+    ``batch`` are fits of other units of the same process, for global risks.
+    """
+    models = list(fitted) if isinstance(fitted, list | tuple) else [fitted]
+    limits = limits if isinstance(limits, Limits) else read_limits(limits)
+    return Verdict(assess([_evidence(m) for m in models], limits, probabilities, [_evidence(b) for b in batch]))
+
+
+def compare(*fitted, claims=None, rope: float = ROPE, seed: int = 0) -> Comparison:
+    """The comparison of two or more fits (or folders of fits); ``claims`` is a file, or "paper" for the published ones."""
+    evidences = [_evidence(f) for f in fitted]
+    level = evidences[0].about["level"] if evidences else 0.9
+    return Comparison(compare_evidence(evidences, read_claims(claims) if claims else None, rope, level, seed))
+
+
+def report(*results, out: Path | str) -> Path:
+    """Save the results (or take folders that hold some) below ``out`` and make out/report.pdf of them."""
+    from backdrive_bayes.report.report import write_report
+
+    folders = []
+    for number, result in enumerate(results, 1):
+        own = Path(out) / f"{number}-{type(result).__name__.lower()}"
+        folders.append(Path(result) if isinstance(result, str | Path) else result.save(own, figures=False))
+    return write_report(folders, Path(out) / "report.pdf")
+
+
+def _evidence(fitted) -> Evidence:
+    if isinstance(fitted, Fit):
+        return fitted.evidence
+    if isinstance(fitted, Evidence):
+        return fitted
+    return Evidence.read(Path(fitted)) if is_result(Path(fitted)) else fit(fitted).evidence
+
+
+def _save(result, name, figures_of, folder, figures):
+    with write_folder(folder) as room:
+        write_json(room / name, result)
+        if figures:
+            draw_figures(figures_of, room)
+    return Path(folder)
+
+
+def _title(name, text):
+    return f"<p><b>{html.escape(name)}</b>: {html.escape(text)}</p>"
+
+
+def _table(names, rows):
+    head = "".join(f"<th>{html.escape(str(n))}</th>" for n in names)
+    body = "".join("<tr>" + "".join(f"<td>{html.escape(str(c))}</td>" for c in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _probability(probability):
+    return "–" if probability is None else probability_text(probability)
+
+
+def _interval(entry):
+    return "–" if entry is None else f"{entry['median']:.4g} [{entry['lo']:.4g}, {entry['hi']:.4g}]"
+
+
+def _between(row):
+    return f"{row['min']:.4g} to {row['max']:.4g}".replace("-inf to", "at most").replace(" to inf", " or more")

@@ -1,0 +1,105 @@
+"""`compare`: differences of units at matched rate and amplitude, and claims with probabilities."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backdrive_bayes.commands.output import default_out, probability_text, progress, say, write_folder, write_json
+from backdrive_bayes.commands.results import (
+    FitOptions,
+    add_fit_arguments,
+    draw_figures,
+    fit_unit,
+    is_result,
+    keep_fit,
+    ready_unit,
+)
+from backdrive_bayes.errors import BadInput
+
+HELP = "differences of units with intervals, and the probability of claims about them"
+
+
+def add_arguments(parser) -> None:
+    """Options of this verb."""
+    what = "two or more unit folders, record files or former fits"
+    parser.add_argument("units", type=Path, nargs="+", metavar="UNIT", help=what)
+    parser.add_argument("--claims", metavar="FILE|paper", help="claims to be answered: a TOML file, or the published ones")
+    parser.add_argument(
+        "--rope", type=float, default=0.05, metavar="SHARE", help="relative difference that counts as none (default 0.05)"
+    )
+    add_fit_arguments(parser)
+
+
+def run(args) -> int:
+    """Write comparison.json and figures, and what new fits give; 0 done, 4 where a unit did not converge."""
+    from backdrive_bayes.decisions.claims import read_claims
+    from backdrive_bayes.decisions.comparison import compare
+
+    options = FitOptions.of(args)
+    if len(args.units) < 2:
+        raise BadInput("compare", "two units or more", "one")
+    if not 0 < args.rope < 1:
+        raise BadInput("--rope", "a share between 0 and 1", args.rope)
+    claims = read_claims(args.claims) if args.claims else None
+    evidences, made = _evidences(args, options)
+    result = compare(evidences, claims, args.rope, args.level, args.seed)
+    out = args.out or default_out("-".join(result["names"][:3]), "compare")
+    with write_folder(out) as folder:
+        for name, (posterior, own) in made.items():
+            (folder / name).mkdir()
+            keep_fit(posterior, own, folder / name, not args.no_figures)
+        write_json(folder / "comparison.json", result)
+        if not args.no_figures:
+            draw_figures("save_comparison_figures", folder)
+    _summarise(result, out)
+    return 0 if result["converged"] else 4
+
+
+def _evidences(args, options):
+    """Evidence of every unit in order, and the new fits by the name of their folder."""
+    from backdrive_bayes.decisions.evidence import Evidence
+
+    # Whatever cannot be read is said before the first unit is sampled.
+    units = [Evidence.read(path) if is_result(path) else ready_unit(path)[0] for path in args.units]
+    evidences, made = [], {}
+    for unit in units:
+        if isinstance(unit, Evidence):
+            evidences.append(unit)
+            continue
+        with progress() as note:
+            posterior, result = fit_unit(unit, options, lambda text, name=unit.name, note=note: note(f"{name}: {text}"))
+        evidences.append(Evidence.of(posterior, result))
+        name = default_out(unit.name, "fit").name
+        made[name if name not in made else f"{name}-{len(made) + 1}"] = posterior, result
+    return evidences, made
+
+
+def _summarise(result: dict, out: Path) -> None:
+    if not result["converged"]:
+        say("INCONCLUSIVE: a unit's sampling has not converged; give it more time (--budget)")
+    for pair in result["pairs"]:
+        say(f"{pair['first']} against {pair['second']}: ratio [{result['level']:.0%} interval]")
+        for condition in pair["conditions"]:
+            predicted = f" (predicted: {', '.join(condition['predicted'])})" if condition["predicted"] else ""
+            say(f"  {condition['loading_rate_Nm_per_s']:.3g} N·m/s, ±{condition['amplitude_Nm']:.3g} N·m{predicted}")
+            say("    " + ", ".join(_ratios(condition["indicators"])))
+        for refused in pair["refused"]:
+            say(f"  not compared: {refused['unit']} at {refused['record']}: {refused['reason']}")
+    for claim in (result["claims"] or {}).get("claims", []):
+        probability = "" if claim["probability"] is None else f" (probability {probability_text(claim['probability'])})"
+        say(f"  claim {claim['id']}: {claim['claim']}: {claim['verdict']}{probability} {claim['reason']}".rstrip())
+    say(f"written to {out}/comparison.json")
+
+
+def _ratios(indicators: dict):
+    names = (
+        ("lost_motion_rad", "δ"),
+        ("zero_torque_width_rad", "w(0)"),
+        ("peak_angle_rad", "peak"),
+        ("loop_area_J", "S"),
+        ("dissipation_ratio", "u"),
+    )
+    for key, symbol in names:
+        ratio = (indicators.get(key) or {}).get("ratio")
+        if ratio:
+            yield f"{symbol} {ratio['median']:.3g} [{ratio['lo']:.3g}, {ratio['hi']:.3g}] {indicators[key]['verdict']}"

@@ -1,0 +1,259 @@
+"""The verdict on a unit: accepted, rejected or inconclusive, with its risks, the limiting indicator and what to measure next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backdrive_bayes.decisions.conformance import (
+    Risks,
+    Verdict,
+    acceptance_interval,
+    conformance_probability,
+    guard_bands,
+    monte_carlo_error,
+    share,
+)
+from backdrive_bayes.decisions.evidence import Evidence
+from backdrive_bayes.decisions.global_risk import global_risks, process_of_batch
+from backdrive_bayes.decisions.limits import Limit, Limits
+from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops
+from backdrive_bayes.decisions.next_step import advice, repeats_to_settle
+from backdrive_bayes.decisions.structure import Structure, weigh
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.indicators.draws import UNITS
+
+SCHEMA = "backdrive-bayes/verdict/1"
+BINS = 60
+FEWEST_UNITS = 3
+_EXPLAIN = "Fit with the effects that the diagnosis names, or give their models with --model."
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One limit at one loop, and the draws that tell of it under each model (draws,)."""
+
+    limit: Limit
+    loop: Loop
+    values: tuple[np.ndarray, ...]
+
+    @property
+    def conformance(self) -> list[float]:
+        """p_c under each model."""
+        return [conformance_probability(v, self.limit.lo, self.limit.hi) for v in self.values]
+
+    @property
+    def inside(self) -> list[np.ndarray]:
+        """Which draws conform, under each model."""
+        return [(v >= self.limit.lo) & (v <= self.limit.hi) for v in self.values]
+
+
+def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
+    """The verdict object of a unit from one or several models' draws.
+
+    ``batch`` holds evidence of other units of the same process, for global risks. Raises BadInput where a limit names a loop
+    that was neither measured nor can be predicted.
+    """
+    structure = weigh(evidences, probabilities)
+    judged = [j for limit in limits.limits for j in _judge(structure, limit, limits)]
+    together = Risks(structure.average(_together(structure, judged)), structure.unknown)
+    verdict, reason = _verdict(structure, together, limits)
+    rows = [_row(structure, j, limits, batch) for j in judged]
+    limiting = min(range(len(rows)), key=lambda i: (round(rows[i]["conformance_probability"], 4), _margin(rows[i])))
+    first = structure.models[0].evidence
+    return {
+        "schema": SCHEMA,
+        "unit": first.name,
+        "verdict": verdict.value,
+        "reason": reason,
+        "risk": {"consumer": limits.consumer, "producer": limits.producer},
+        "conformance_probability": together.conformance,
+        "specific_consumer_risk": together.consumer,
+        "specific_producer_risk": together.producer,
+        "limiting": {k: rows[limiting][k] for k in ("indicator", "loading_rate_Nm_per_s", "amplitude_Nm")},
+        "next": _next(structure, verdict, rows, limiting, limits),
+        "limits": rows,
+        "structure": structure.to_json(),
+        "convergence": first.about["convergence"],
+        "k": first.about["k"],
+        "level": first.about["level"],
+        "identity": first.about.get("identity") or {},
+        "rated_torque_Nm": first.rated_torque,
+        "reproduction": first.reproduction,
+    }
+
+
+def _judge(structure: Structure, limit: Limit, limits: Limits) -> list[Judged]:
+    first = structure.models[0].evidence
+    if limit.k is not None and abs(limit.k - first.about["k"]) > 1e-9:
+        raise BadInput(limit.where, f"k = {first.about['k']:g}, at which the lost motion was taken", f"k = {limit.k:g}")
+    loops = limited_loops(limit, first.measured)
+    try:
+        # A prediction is known for the kept draws only, and all limits are judged on the same draws.
+        kept = any(x.amplitude is not None for x in limits.limits)
+        values = [tuple(m.evidence.values(limit.indicator, loop, kept) for m in structure.models) for loop in loops]
+    except NotAvailable as why:
+        raise BadInput(limit.where, "an indicator that is defined there", str(why)) from None
+    return [Judged(limit, loop, v) for loop, v in zip(loops, values, strict=True)]
+
+
+def limited_loops(limit: Limit, measured) -> list[Loop]:
+    """The loops for which a limit holds, out of those that were measured or lie within them.
+
+    A limit that names no rate holds for the unit's largest loops, or at all rates at which its amplitude is known. BadInput
+    where there is none.
+    """
+    top = largest_loops(measured)
+    reach = limit.amplitude or max(x.amplitude for x in top)
+    rates = [limit.rate] if limit.rate is not None else [x.rate for x in top if x.amplitude > 0.98 * reach] or [top[0].rate]
+    try:
+        return [find_loop(measured, rate, limit.amplitude) for rate in rates]
+    except NotAvailable as why:
+        raise BadInput(limit.where, "a loop that was measured or can be predicted", str(why)) from None
+
+
+def _margin(row) -> float:
+    """Distance of the median from the nearest limit in standard deviations, negative beyond it."""
+    return min(row["median"] - row["min"], row["max"] - row["median"]) / (row["sd"] or 1e-300)
+
+
+def _together(structure, judged) -> list[float]:
+    """Probability under each model that all limits are kept at once."""
+    return [share(np.logical_and.reduce([j.inside[i] for j in judged])) for i in range(len(structure.models))]
+
+
+def _verdict(structure: Structure, risks: Risks, limits: Limits) -> tuple[Verdict, str]:
+    bad = [m.evidence for m in structure.models if not m.evidence.converged]
+    if bad:
+        advised = bad[0].about["convergence"].get("advice") or "sample longer"
+        return Verdict.INCONCLUSIVE, f"the sampling has not converged: {advised.partition(': ')[2] or advised}"
+    verdict = risks.verdict(limits.consumer, limits.producer)
+    if verdict is Verdict.ACCEPTED:
+        return verdict, f"the risk that it is out of limits, {_p(risks.consumer)}, is at most the agreed {_p(limits.consumer)}"
+    if verdict is Verdict.REJECTED:
+        return verdict, f"the risk that it is within limits, {_p(risks.producer)}, is at most the agreed {_p(limits.producer)}"
+    if structure.unknown > min(limits.consumer, limits.producer):
+        names = ", ".join(f"{n.replace('_', ' ')} ({_p(p)})" for n, p in structure.uncovered.items())
+        return verdict, f"a gap between model and data is not explained by the model at hand: {names}"
+    return verdict, (
+        f"out of limits with probability {_p(risks.consumer)}, within with {_p(risks.producer)}: neither is as small as agreed"
+    )
+
+
+def _p(probability: float) -> str:
+    if probability < 0.001:
+        return "below 0.1 %"
+    return f"{100 * probability:.2g} %" if probability < 0.99 else f"{min(100 * probability, 99.9):.1f} %"
+
+
+def _row(structure: Structure, judged: Judged, limits: Limits, batch) -> dict:
+    """All numbers of one limit at one loop; medians and intervals are of the mixture of models."""
+    limit, loop, first = judged.limit, judged.loop, structure.models[0].evidence
+    mixed = _mixture(structure, judged.values)
+    level = first.about["level"]
+    low, median, high = (float(q) for q in np.quantile(mixed, [0.5 - level / 2, 0.5, 0.5 + level / 2]))
+    risks = Risks(structure.average(judged.conformance), structure.unknown)
+    effective = min(float(np.size(judged.values[0])), first.about["convergence"]["min_tail_ess"] or 1.0)
+    upper, lower = guard_bands(mixed, limits.consumer)
+    row = {
+        "indicator": limit.indicator,
+        "unit": UNITS[limit.indicator],
+        "loading_rate_Nm_per_s": loop.rate,
+        "amplitude_Nm": loop.amplitude,
+        "predicted": loop.predicted,
+        "min": limit.lo,
+        "max": limit.hi,
+        "median": median,
+        "lo": low,
+        "hi": high,
+        "sd": float(np.std(mixed)),
+        "conformance_probability": risks.conformance,
+        "monte_carlo_error": monte_carlo_error(risks.conformance, effective),
+        "specific_consumer_risk": risks.consumer,
+        "specific_producer_risk": risks.producer,
+        "verdict": risks.verdict(limits.consumer, limits.producer).value if first.converged else Verdict.INCONCLUSIVE.value,
+        "guard_band": {"below_max": upper, "above_min": lower},
+        "accept_median_between": [limit.lo + lower, limit.hi - upper],
+        "model_error_share": first.model_error_share(limit.indicator, loop),
+        "naive": _naive(first, limit, loop),
+        "histogram": _histogram(mixed),
+    }
+    return row | {"global": _global(row, limit, limits, batch)}
+
+
+def _mixture(structure, values, draws: int = 4000):
+    """Equally weighted draws of the models' mixture, the same at every call."""
+    if len(values) == 1:
+        return values[0]
+    total = sum(m.probability for m in structure.models)
+    counts = [int(round(draws * m.probability / total)) for m in structure.models]
+    return np.concatenate([np.quantile(v, (np.arange(n) + 0.5) / n) for v, n in zip(values, counts, strict=True) if n])
+
+
+def _histogram(values):
+    lo, hi = np.quantile(values, [0.0005, 0.9995])
+    margin = 0.05 * (hi - lo) or 0.01 * abs(hi) or 1.0
+    counts, edges = np.histogram(values, bins=BINS, range=(lo - margin, hi + margin))
+    return {"edges": edges.tolist(), "counts": counts.tolist()}
+
+
+def _naive(evidence: Evidence, limit: Limit, loop: Loop) -> dict:
+    """What the classic evaluation would decide: its point estimate against the limit."""
+    classic = (evidence.record_json(loop).get("least_squares") or {}).get("indicators") or {}
+    value = None if loop.predicted else classic.get(limit.indicator)
+    return {"value": value, "inside": None if value is None else bool(limit.lo <= value <= limit.hi)}
+
+
+def _global(row, limit: Limit, limits: Limits, batch) -> dict | None:
+    """Global risks of this decision rule over units of the process, measured as this one was."""
+    process, units = limit.process, 0
+    if process is None and batch:
+        process, units = _process(limit, row, batch)
+    if process is None or row["sd"] <= 0:
+        return None
+    accepted = acceptance_interval(row["sd"], limit.lo, limit.hi, 1 - limits.consumer)
+    # An estimate is rejected where p_c is at most the producer's risk: outside the interval of larger p_c.
+    kept = acceptance_interval(row["sd"], limit.lo, limit.hi, limits.producer) or (np.inf, -np.inf)
+    found = global_risks(process, row["sd"], (limit.lo, limit.hi), accepted, kept)
+    return {"process": process.to_json(), "batch_units": units, "uncertainty": row["sd"], "accepted": accepted} | found.to_json()
+
+
+def _process(limit, row, batch):
+    estimates, spreads = [], []
+    for other in batch:
+        try:
+            values = other.values(limit.indicator, other.loop(row["loading_rate_Nm_per_s"], row["amplitude_Nm"]))
+        except NotAvailable as why:
+            raise BadInput(other.where, f"{limit.indicator} of the batch's unit", str(why)) from None
+        estimates.append(float(np.median(values)))
+        spreads.append(float(np.std(values)))
+    if len(estimates) < FEWEST_UNITS:
+        raise BadInput("batch", f"at least {FEWEST_UNITS} other units", f"{len(estimates)}")
+    return process_of_batch(estimates, spreads), len(estimates)
+
+
+def _next(structure: Structure, verdict: Verdict, rows: list[dict], limiting: int, limits: Limits) -> dict | None:
+    if verdict is not Verdict.INCONCLUSIVE:
+        return None
+    row, repeats = rows[limiting], None
+    if not all(m.evidence.converged for m in structure.models):
+        text = "Fit again with a longer budget (--budget); nothing needs to be measured for that."
+    elif structure.unknown > min(limits.consumer, limits.producer):
+        test = (structure.models[0].evidence.diagnosis or {}).get("next_test") or {}
+        text = f"Explain the gap first. {test.get('do') or _EXPLAIN}"
+    else:
+        repeats = None if row["predicted"] else repeats_to_settle(rows, limits.consumer, limits.producer)
+        text = advice(row, repeats)
+    return {
+        "indicator": row["indicator"],
+        "loading_rate_Nm_per_s": row["loading_rate_Nm_per_s"],
+        "amplitude_Nm": row["amplitude_Nm"],
+        "repeats_in_all": repeats,
+        "do": text,
+    }
+
+
+def with_risk(limits: Limits, consumer: float | None = None, producer: float | None = None) -> Limits:
+    """The same limits with other agreed risks."""
+    return replace(limits, consumer=consumer or limits.consumer, producer=producer or limits.producer)

@@ -1,0 +1,129 @@
+"""Global consumer's and producer's risks of a production process that is measured, JCGM 106:2012, 9.5 and annex A."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import stats
+from scipy.optimize import brentq
+
+SHAPES = ("normal", "lognormal", "gamma")
+NODES, PIECES = 40, 24
+REACH = 9.0
+"""Standard deviations beyond which nothing is integrated."""
+
+
+@dataclass(frozen=True)
+class Process:
+    """What is known of a production process before a unit is measured: mean and standard deviation of the quantity, and shape."""
+
+    mean: float
+    sd: float
+    shape: str = "normal"
+
+    @cached_property
+    def distribution(self):
+        """The frozen scipy distribution."""
+        if self.shape == "normal":
+            return stats.norm(self.mean, self.sd)
+        ratio2 = (self.sd / self.mean) ** 2
+        if self.shape == "lognormal":
+            return stats.lognorm(np.sqrt(np.log1p(ratio2)), scale=self.mean / np.sqrt(1 + ratio2))
+        return stats.gamma(1 / ratio2, scale=self.mean * ratio2)
+
+    def to_json(self) -> dict:
+        """As saved."""
+        return {"mean": self.mean, "sd": self.sd, "shape": self.shape}
+
+
+@dataclass(frozen=True)
+class GlobalRisks:
+    """Probabilities over units of the process and their measurements.
+
+    ``consumer``: out of limits and accepted; ``producer``: within limits and rejected; ``nonconforming``: out of limits;
+    ``accepted``, ``rejected``: the shares of units so decided (the rest is inconclusive).
+    """
+
+    consumer: float
+    producer: float
+    nonconforming: float
+    accepted: float
+    rejected: float
+
+    def to_json(self) -> dict:
+        """As saved, with the share that stays inconclusive."""
+        return asdict(self) | {"inconclusive": max(0.0, 1 - self.accepted - self.rejected)}
+
+
+def global_risks(process: Process, uncertainty: float, limit, accepted, rejected_outside=None) -> GlobalRisks:
+    """Risks of accepting estimates inside ``accepted`` and rejecting those outside ``rejected_outside``.
+
+    ``limit``, ``accepted`` and ``rejected_outside`` (by default the same) are pairs (low, high), infinities allowed; ``accepted``
+    may be None. The measurement is normal with standard ``uncertainty``. Formulas (17) to (20) in JCGM 106:2012, 9.5 and annex A
+    are the case without an inconclusive zone.
+    """
+    rejected_outside = accepted if rejected_outside is None else rejected_outside
+    inside, outside = _regions(process, uncertainty, limit, accepted, rejected_outside)
+    return GlobalRisks(
+        _mass(outside, process, uncertainty, accepted),
+        _mass(inside, process, uncertainty, rejected_outside, complement=True),
+        _mass(outside, process),
+        _mass(inside + outside, process, uncertainty, accepted),
+        _mass(inside + outside, process, uncertainty, rejected_outside, complement=True),
+    )
+
+
+def guarded_limit(process: Process, uncertainty: float, limit, target: float) -> tuple[float, float]:
+    """The acceptance interval, both sides moved alike, whose global consumer's risk is ``target``. JCGM 106:2012, 9.5.4."""
+    lo, hi = limit
+
+    def excess(guard):
+        return global_risks(process, uncertainty, limit, (lo + guard, hi - guard)).consumer - target
+
+    widest = 0.5 * (hi - lo) * (1 - 1e-9) if np.isfinite(lo) and np.isfinite(hi) else REACH * uncertainty
+    guard = brentq(excess, -REACH * uncertainty, widest)
+    return lo + guard, hi - guard
+
+
+def process_of_batch(estimates, uncertainties) -> Process:
+    """A normal process from other units' estimates, their measurement variance taken out."""
+    estimates, uncertainties = np.asarray(estimates, float), np.asarray(uncertainties, float)
+    total, measured = np.var(estimates, ddof=1), np.mean(uncertainties**2)
+    # A batch that scatters no more than its measurements tells only that the process does not scatter more.
+    return Process(float(estimates.mean()), float(np.sqrt(max(total - measured, 0.05 * total, 1e-24))))
+
+
+def _regions(process, uncertainty, limit, *intervals):
+    """Pieces (low, high) of the process's support within and beyond the limit, cut where an integrand bends."""
+    d = process.distribution
+    low, high = max(process.mean - 40 * process.sd, d.support()[0]), process.mean + 40 * process.sd
+    low, high = max(low, float(d.ppf(1e-15))), min(high, float(d.isf(1e-15)))
+    bends = [low, high]
+    for lo_hi in (limit, *(i for i in intervals if i is not None)):
+        for edge in lo_hi:
+            if np.isfinite(edge):
+                bends += [edge + s * uncertainty for s in (-REACH, -2, 0, 2, REACH)]
+    bends += list(np.linspace(low, high, PIECES + 1))
+    bends = np.unique(np.clip(bends, low, high))
+    pieces = list(zip(bends[:-1], bends[1:], strict=True))
+    within = [p for p in pieces if limit[0] <= 0.5 * (p[0] + p[1]) <= limit[1]]
+    return within, [p for p in pieces if p not in within]
+
+
+def _mass(pieces, process, uncertainty=None, interval=None, complement=False) -> float:
+    """∫ g₀(η) P(estimate in interval | η) dη over ``pieces`` by Gauss-Legendre."""
+    if uncertainty is not None and interval is None:
+        return _mass(pieces, process) if complement else 0.0
+    node, weight = np.polynomial.legendre.leggauss(NODES)
+    total = 0.0
+    for a, b in pieces:
+        x = 0.5 * (b - a) * node + 0.5 * (a + b)
+        value = process.distribution.pdf(x)
+        if uncertainty is not None:
+            lo, hi = ((edge - x) / uncertainty for edge in interval)
+            inside = stats.norm.cdf(hi) - stats.norm.cdf(lo)
+            value = value * (stats.norm.cdf(lo) + stats.norm.sf(hi) if complement else inside)
+        total += 0.5 * (b - a) * float(weight @ value)
+    return float(total)

@@ -1,0 +1,94 @@
+"""Loops by rate and amplitude: which were measured, which can be predicted, and why others cannot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backdrive_bayes.indicators.draws import POSITIONS
+
+SAME_RATE = 0.1
+"""Relative difference up to which two loading rates are the same."""
+SAME_AMPLITUDE = 0.02
+"""Relative difference up to which two amplitudes are the same."""
+
+
+class NotAvailable(Exception):
+    """A loop or indicator that neither was measured nor can be predicted; its text says why."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A settled loop by rate [N·m/s] and amplitude [N·m], and the numbers of the records that tell of it.
+
+    ``predicted`` is true where the amplitude lies within a larger measured one.
+    """
+
+    rate: float
+    amplitude: float
+    records: tuple[int, ...]
+    predicted: bool = False
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"{self.rate:.3g} N·m/s, ±{self.amplitude:.3g} N·m{' (predicted)' if self.predicted else ''}"
+
+
+def measured_loops(rates, amplitudes) -> tuple[Loop, ...]:
+    """The loops of records with those rates and amplitudes, (records,) each, in rising order; repeats are one loop."""
+    rates, amplitudes = np.asarray(rates, float), np.asarray(amplitudes, float)
+    groups: list[list[int]] = []
+    for i in np.lexsort((amplitudes, rates)):
+        group = next((g for g in groups if _alike(rates, amplitudes, g[0], i)), None)
+        if group is None:
+            groups.append([int(i)])
+        else:
+            group.append(int(i))
+    return tuple(Loop(float(rates[g].mean()), float(amplitudes[g].mean()), tuple(g)) for g in groups)
+
+
+def _alike(rates, amplitudes, i, j):
+    return same(rates[i], rates[j], SAME_RATE) and same(amplitudes[i], amplitudes[j], SAME_AMPLITUDE)
+
+
+def same(a: float, b: float, tolerance: float) -> bool:
+    """Whether two positive numbers agree to a relative tolerance."""
+    return abs(a / b - 1) <= tolerance
+
+
+def largest_loops(measured) -> list[Loop]:
+    """The loop of largest amplitude at every rate."""
+    best: list[Loop] = []
+    for loop in measured:
+        alike = [i for i, b in enumerate(best) if same(loop.rate, b.rate, SAME_RATE)]
+        if not alike:
+            best.append(loop)
+        elif loop.amplitude > best[alike[0]].amplitude:
+            best[alike[0]] = loop
+    return best
+
+
+def find_loop(measured, rate: float, amplitude: float | None = None) -> Loop:
+    """The loop of that rate and amplitude (the largest measured one by default), predicted where it must be.
+
+    Raises NotAvailable for a rate that was not measured, and for an amplitude beyond the measured one or far below it.
+    """
+    at_rate = [x for x in measured if same(x.rate, rate, SAME_RATE)]
+    if not at_rate:
+        shown = ", ".join(f"{x.rate:.3g}" for x in largest_loops(measured))
+        raise NotAvailable(f"rate {rate:.3g} N·m/s was not measured (only {shown} N·m/s) and rates cannot be predicted")
+    top = max(at_rate, key=lambda x: x.amplitude)
+    if amplitude is None:
+        return top
+    exact = [x for x in at_rate if same(x.amplitude, amplitude, SAME_AMPLITUDE)]
+    if exact:
+        return min(exact, key=lambda x: abs(x.amplitude - amplitude))
+    if amplitude > top.amplitude:
+        most = f"{top.amplitude:.3g} N·m at {top.rate:.3g} N·m/s"
+        raise NotAvailable(f"amplitude {amplitude:.3g} N·m lies beyond the measured {most}")
+    lowest = top.amplitude / POSITIONS
+    if amplitude < lowest:
+        raise NotAvailable(f"amplitude {amplitude:.3g} N·m is below {lowest:.3g} N·m, the smallest that is predicted")
+    return Loop(top.rate, float(amplitude), top.records, True)

@@ -1,0 +1,94 @@
+"""Structure counts: which share of probability the models at hand cover, and what a gap diagnosis leaves unexplained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backdrive_bayes.decisions.evidence import Evidence
+from backdrive_bayes.errors import BadInput
+
+SMALL = 1e-3
+"""A probability that is not worth a word."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """One model of a unit that stays probable: its draws and its probability."""
+
+    evidence: Evidence
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """The models that are averaged over, and what none of them holds: probabilities by effect."""
+
+    models: tuple[Model, ...]
+    uncovered: dict[str, float]
+    diagnosed: bool
+
+    @property
+    def unknown(self) -> float:
+        """Probability that something acts which no model at hand holds."""
+        return float(min(1.0, sum(self.uncovered.values())))
+
+    def average(self, values) -> float:
+        """Mean of one number a model, with their probabilities; what is uncovered adds nothing."""
+        return float(sum(m.probability * v for m, v in zip(self.models, values, strict=True)))
+
+    def to_json(self) -> dict:
+        """As saved."""
+        models = [m.evidence.about["model"] | {"probability": m.probability} for m in self.models]
+        return {
+            "diagnosed": self.diagnosed,
+            "models": models,
+            "uncovered": self.uncovered,
+            "unknown_probability": self.unknown,
+        }
+
+
+def weigh(evidences, probabilities=None) -> Structure:
+    """Models of one unit with their probabilities.
+
+    ``probabilities`` are given for several models, at most 1 in all, or (None) read from the diagnosis beside the only one. What
+    they leave over belongs to no model. BadInput where they do not fit.
+    """
+    evidences = list(evidences)
+    diagnosis = next((e.diagnosis for e in evidences if e.diagnosis), None)
+    if probabilities is None and len(evidences) > 1:
+        raise BadInput("models", "a probability for each of several models of a unit", "none")
+    uncovered = _uncovered(diagnosis, set().union(*(e.effects for e in evidences)))
+    if probabilities is None:
+        return Structure((Model(evidences[0], 1.0 - min(1.0, sum(uncovered.values()))),), uncovered, diagnosis is not None)
+    return _given(evidences, [float(p) for p in probabilities], diagnosis is not None)
+
+
+def _given(evidences, probabilities, diagnosed):
+    good = len(probabilities) == len(evidences) and all(0 <= p <= 1 for p in probabilities) and 0 < sum(probabilities) <= 1 + 1e-6
+    if not good:
+        shown = ", ".join(f"{p:g}" for p in probabilities)
+        raise BadInput("models", "one probability a model, between 0 and 1 and at most 1 in all", shown)
+    if len({e.name for e in evidences}) > 1:
+        raise BadInput("models", "several models of one unit", " and ".join(sorted({e.name for e in evidences})))
+    left = max(0.0, 1.0 - sum(probabilities))
+    models = tuple(Model(e, p) for e, p in zip(evidences, probabilities, strict=True))
+    return Structure(models, {"models not given": left} if left > SMALL else {}, diagnosed)
+
+
+def _uncovered(diagnosis, held: set[str]) -> dict[str, float]:
+    """Probabilities of the effects that a diagnosis finds and the models do not hold."""
+    if diagnosis is None:
+        return {}
+    try:
+        found = {str(w["effect"]): float(w["probability"]) for w in diagnosis["which"]}
+        answer = [str(name) for name in diagnosis["answer"]["effects"]]
+    except (KeyError, TypeError, ValueError) as error:
+        wanted = "which[].effect, which[].probability and answer.effects"
+        raise BadInput("diagnosis.json", wanted, f"{type(error).__name__} {error}") from None
+    if not all(np.isfinite(p) and 0 <= p <= 1 for p in found.values()):
+        raise BadInput("diagnosis.json", "probabilities between 0 and 1", str(found)[:80])
+    out = {name: p for name, p in found.items() if name != "none" and name not in held and p > SMALL}
+    # What a diagnosis answers with acts, whatever the rounding of its single probabilities.
+    return out | {name: max(0.5, out.get(name, 0.0)) for name in answer if name not in held and name != "none"}

@@ -1,0 +1,87 @@
+"""What is known of each limited indicator, against its limits and guard bands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    VERMILLION,
+    display_unit,
+    few_ticks,
+    indicator_words,
+    new_figure,
+    styled,
+)
+
+CAPTION = (
+    "Posterior of each limited indicator (histogram), its median (solid line), the limits (dashed lines; beyond them is out of "
+    "limits) and the guard bands (shaded orange) that the median must keep free for acceptance. A cross marks the point estimate "
+    "of the classic least-squares fit, where it lies within the panel."
+)
+AT_MOST = 4
+"""Limits in one figure."""
+ROOM = 0.12
+"""Free share of a panel beside what must be seen."""
+
+
+def draw(verdict: dict, rows: list[int]):
+    """Panels of the given rows of a verdict object, two beside each other."""
+    columns = min(2, len(rows))
+    lines = -(-len(rows) // columns)
+    with styled():
+        figure = new_figure(0.65 + 1.2 * lines)
+        axes = figure.subplots(lines, columns, squeeze=False).ravel()
+        for panel, row in zip(axes, rows, strict=False):
+            _panel(panel, verdict["limits"][row])
+        for panel in axes[len(rows) :]:
+            panel.set_visible(False)
+        named: dict = {}
+        for panel in axes[: len(rows)]:
+            for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
+                named.setdefault(name, handle)
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=5)
+    return figure
+
+
+def _panel(panel, row):
+    factor, unit = display_unit(row["unit"])
+    edges, counts = np.asarray(row["histogram"]["edges"]) * factor, np.asarray(row["histogram"]["counts"], float)
+    counts = counts / max(counts.max(), 1.0)
+    low, high = (None if row[k] is None else row[k] * factor for k in ("min", "max"))
+    left, right = _range(edges, counts, low, high)
+    panel.stairs(counts, edges, fill=True, color=BLUE, alpha=0.35, label="posterior")
+    panel.axvline(row["median"] * factor, color=BLUE, linewidth=1.2, label="median")
+    for limit, guard, side in ((high, "below_max", -1), (low, "above_min", 1)):
+        if limit is not None:
+            end = limit + side * row["guard_band"][guard] * factor
+            panel.axvspan(*sorted((limit, end)), color=ORANGE, alpha=0.35, linewidth=0, label="guard band")
+            panel.axvline(limit, color=VERMILLION, linestyle=(0, (5, 2)), linewidth=1.4, label="limit")
+    classic = row["naive"]["value"]
+    if classic is not None and left <= classic * factor <= right:
+        panel.plot(classic * factor, 0.06, linestyle="none", marker="x", color=BLACK, label="least squares")
+    panel.set(xlim=(left, right), ylim=(0, 1.12), yticks=[], xlabel=f"{indicator_words(row['indicator'])} [{unit or '–'}]")
+    colour = {"accepted": GREEN, "rejected": VERMILLION}.get(row["verdict"], BLACK)
+    predicted = ", predicted" if row["predicted"] else ""
+    at = f"{row['loading_rate_Nm_per_s']:.2g} N·m/s, ±{row['amplitude_Nm']:.2g} N·m{predicted}"
+    panel.set_title(f"{at}: {row['verdict']}", color=colour)
+    panel.spines["left"].set_visible(False)
+    few_ticks(panel, 4)
+    panel.set_yticks([])
+
+
+def _range(edges, counts, low, high):
+    """The histogram and, unless that would squeeze it to a line, its limits."""
+    seen = [edges[np.flatnonzero(counts > 0)[0]], edges[np.flatnonzero(counts > 0)[-1] + 1]]
+    width = seen[1] - seen[0]
+    for limit in (low, high):
+        if limit is not None:
+            seen = [min(seen[0], limit), max(seen[1], limit)]
+    # A far limit is left out of sight rather than the posterior.
+    middle = 0.5 * (edges[0] + edges[-1])
+    seen = [max(seen[0], middle - 25 * width), min(seen[1], middle + 25 * width)]
+    margin = ROOM * (seen[1] - seen[0])
+    return seen[0] - margin, seen[1] + margin

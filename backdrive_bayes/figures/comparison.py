@@ -1,0 +1,177 @@
+"""Units beside each other: loops, torque–energy curves, ratios of indicators, and how each releases energy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.figures.style import (
+    ARCMIN_PER_RAD,
+    BLUE,
+    GREY,
+    MJ_PER_J,
+    ORANGE,
+    SERIES,
+    SKY,
+    few_ticks,
+    indicator_words,
+    new_figure,
+    styled,
+)
+
+LOOPS = "Settled loops of the units at the same rate and amplitude: median and interval of each."
+ENERGY = "Torque–energy curves of the units at the same rate and amplitude: median and interval of each."
+RATIOS = (
+    "Ratios of the indicators at matched rate and amplitude: median and interval, on a logarithmic scale. The grey band is the "
+    "region of practical equivalence."
+)
+MECHANISM = (
+    "How each unit releases energy. Left: energy that geometric error and friction dissipate, as shares of S; what is "
+    "missing to 1 or goes beyond it is model error. Right: share of the absorbed energy W_abs that was stored elastically and "
+    "is given back. Medians with intervals."
+)
+SHOWN = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
+SHARES = (("S_g_over_S", "geometric error", BLUE, ""), ("S_f_over_S", "friction", ORANGE, "////"))
+
+
+def draw_loops(comparison: dict, conditions: list[int]):
+    """Overlaid loops at the given overlays (at most three), angle [arcmin] over torque [N·m]."""
+    with styled():
+        figure = new_figure(3.3)
+        axes = _panels(figure, comparison, conditions)
+        for panel, condition in zip(axes, conditions, strict=True):
+            for record, look, name in _members(comparison, condition):
+                _one_loop(panel, record["loop"], look, name)
+            panel.set_xlabel("torque [N·m]")
+        axes[0].set_ylabel("angle [arcmin]")
+        _legend(figure, axes[0])
+    return figure
+
+
+def draw_energy(comparison: dict, conditions: list[int]):
+    """Overlaid torque–energy curves at the given overlays (at most three), mJ per N·m over |torque| [N·m]."""
+    with styled():
+        figure = new_figure(2.9)
+        axes = _panels(figure, comparison, conditions)
+        for panel, condition in zip(axes, conditions, strict=True):
+            for record, look, name in _members(comparison, condition):
+                curve = record["torque_energy"]
+                lo, hi, median = (np.asarray(curve[k]) * MJ_PER_J for k in ("lo", "hi", "median_J_per_Nm"))
+                panel.fill_between(curve["torque_Nm"], lo, hi, color=look["color"], alpha=0.3, linewidth=0)
+                panel.plot(curve["torque_Nm"], median, color=look["color"], linestyle=look["linestyle"], label=name)
+            panel.set(xlabel="|torque| [N·m]", xlim=(0, None), ylim=(0, None))
+        axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
+        _legend(figure, axes[0])
+    return figure
+
+
+def draw_ratios(comparison: dict, pair: int):
+    """Forest plot of one pair of units, one series a condition."""
+    both = comparison["pairs"][pair]
+    shown = [name for name in SHOWN if any((c["indicators"].get(name) or {}).get("ratio") for c in both["conditions"])]
+    with styled():
+        figure = new_figure(1.2 + 0.11 * len(shown) * max(2.2, len(both["conditions"])))
+        panel = figure.subplots()
+        step = 0.7 / max(1, len(both["conditions"]))
+        for i, condition in enumerate(both["conditions"]):
+            look = SERIES[i % len(SERIES)]
+            for row, name in enumerate(shown):
+                ratio = (condition["indicators"].get(name) or {}).get("ratio")
+                if ratio:
+                    at = row + (i - 0.5 * (len(both["conditions"]) - 1)) * step
+                    _whisker(panel, ratio, at, look, _condition(condition) if row == 0 else None)
+        rope = comparison["rope"]
+        panel.axvspan(1 / (1 + rope), 1 + rope, color=GREY, alpha=0.35, linewidth=0)
+        panel.axvline(1.0, color="black", linewidth=0.7)
+        panel.set(xscale="log", yticks=range(len(shown)), ylim=(len(shown) - 0.45, -0.55))
+        panel.set_yticklabels([indicator_words(name) for name in shown])
+        panel.set_xlabel(f"ratio: {_short(both['first'])} over {_short(both['second'])} [–]")
+        _plain_log(panel)
+        figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def draw_mechanism(comparison: dict):
+    """Stacked shares of S and the elastic share of W_abs, one bar a unit and record."""
+    bars = [(m["unit"], r) for m in comparison["mechanism"] for r in m["records"]]
+    with styled():
+        figure = new_figure(1.0 + 0.27 * len(bars))
+        left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.5, 1])
+        for row, (_, record) in enumerate(bars):
+            begin = 0.0
+            for key, name, colour, hatch in SHARES:
+                begin += _bar(left, record[key], row, begin, name, colour, hatch)
+            _bar(right, record["elastic_share"], row, 0.0, "given back", SKY, "")
+        left.axvline(1.0, color="black", linewidth=0.7)
+        left.set(xlim=(0, max(1.0, left.get_xlim()[1])), xlabel="share of S [–]", ylim=(len(bars) - 0.5, -0.5))
+        left.set_yticks(range(len(bars)), [f"{_short(name)}, {_condition(r)}" for name, r in bars])
+        right.set(xlim=(0, 1), xlabel="share of W_abs [–]")
+        handles = [*zip(*left.get_legend_handles_labels(), strict=True), *zip(*right.get_legend_handles_labels(), strict=True)]
+        figure.legend([h for h, _ in handles], [n for _, n in handles], loc="outside lower center", ncols=3)
+    return figure
+
+
+def _bar(panel, interval, row, begin, name, colour, hatch) -> float:
+    """One bar with its interval; its length."""
+    if not interval:
+        return 0.0
+    length, label = interval["median"], name if row == 0 else None
+    panel.barh(row, length, left=begin, height=0.66, label=label, color=colour, hatch=hatch, edgecolor="white", linewidth=0)
+    panel.errorbar(begin + length, row, xerr=_reach(interval), color="black", capsize=2, linewidth=0.8)
+    return length
+
+
+def _panels(figure, comparison, conditions):
+    axes = figure.subplots(1, len(conditions), sharey=True, squeeze=False)[0]
+    for panel, condition in zip(axes, conditions, strict=True):
+        panel.set_title(_condition(comparison["overlays"][condition]))
+        few_ticks(panel, {1: 10, 2: 6, 3: 4}[len(conditions)])
+    return axes
+
+
+def _members(comparison, condition):
+    """Record object, look and name of every unit in an overlay."""
+    for member in comparison["overlays"][condition]["units"]:
+        unit = comparison["names"].index(member["unit"])
+        yield comparison["units"][unit]["records"][member["record"]], SERIES[unit % len(SERIES)], _short(member["unit"])
+
+
+def _one_loop(panel, loop, look, name):
+    for i, branch in enumerate(("rising_rad", "falling_rad")):
+        lo, hi, median = (np.asarray(loop[branch][k]) * ARCMIN_PER_RAD for k in ("lo", "hi", "median"))
+        panel.fill_between(loop["torque_Nm"], lo, hi, color=look["color"], alpha=0.3, linewidth=0)
+        panel.plot(loop["torque_Nm"], median, color=look["color"], linestyle=look["linestyle"], label=None if i else name)
+
+
+def _legend(figure, panel):
+    figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+
+
+def _whisker(panel, interval, at, look, name):
+    panel.errorbar(
+        interval["median"], at, xerr=_reach(interval), color=look["color"], marker=look["marker"], linestyle="none", label=name,
+        markersize=4, markerfacecolor="white", capsize=2,
+    )  # fmt: skip
+
+
+def _reach(interval):
+    return [[max(interval["median"] - interval["lo"], 0.0)], [max(interval["hi"] - interval["median"], 0.0)]]
+
+
+def _plain_log(panel):
+    """Ticks at 1, 2 and 5 in plain numbers where the axis is short, at decades where it is long."""
+    low, high = panel.get_xlim()
+    steps = (1, 2, 5) if high / low < 2000 else (1,)
+    ticks = [s * 10.0**p for p in range(-9, 10) for s in steps]
+    if high / low < 4:
+        ticks = list(np.round(np.arange(0.1, 10, 0.1), 1))
+    ticks = [t for t in ticks if low <= t <= high]
+    panel.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    panel.minorticks_off()
+
+
+def _condition(at) -> str:
+    return f"{at['loading_rate_Nm_per_s']:.2g} N·m/s, ±{at['amplitude_Nm']:.2g} N·m"
+
+
+def _short(name: str, most: int = 24) -> str:
+    return name if len(name) <= most else name[: most - 1] + "…"

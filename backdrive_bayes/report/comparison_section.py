@@ -1,0 +1,176 @@
+"""The chapter of a comparison: what differs between units and by how much, and how each releases energy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backdrive_bayes.figures.catalogue import caption, comparison_figures
+from backdrive_bayes.figures.style import display_unit, indicator_words
+from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
+from backdrive_bayes.report.claims_section import claims
+from backdrive_bayes.report.numbers import interval_text, level_text, probability_text
+from backdrive_bayes.report.text import free
+from backdrive_bayes.results import COMPARISON, read_result
+
+KEY = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
+DEFAULT_RATE = 0.05
+"""Rate of the summary's condition, where it was measured [N·m/s]."""
+
+
+def chapter(folder: Path) -> Chapter:
+    """Read a result folder of ``compare`` and lay out its pages."""
+    result = read_result(Path(folder) / "comparison.json", COMPARISON)
+    figures = comparison_figures(result)
+    title = free("Comparison: " + ", ".join(result["names"]), 110)
+    on_summary = [n for n in ("comparison-loops",) if n in figures]
+    rest = [Picture(n, caption(n)) for n in figures if n not in on_summary and n != "comparison-mechanism"]
+    return Chapter(
+        title,
+        [
+            Heading(title, 1),
+            _banner(result),
+            _identity(result),
+            *_key_tables(result),
+            *(Picture(n, caption(n)) for n in on_summary),
+            Signature(["Reviewed by", "Date", "Signature"]),
+        ],
+        [
+            *(Picture(n, caption(n), spilt=True) for n in on_summary),
+            Heading("How each unit releases energy"),
+            Picture("comparison-mechanism", caption("comparison-mechanism")),
+            *_mechanism(result),
+            *rest,
+            *_all_tables(result),
+            *_refused(result),
+            *claims(result),
+            *_reproduction(result),
+        ],
+        figures,
+    )
+
+
+def _banner(result):
+    rows = [r for p in result["pairs"] for c in p["conditions"] for r in c["indicators"].values()]
+    if not result["converged"]:
+        return Banner("bad", "INCONCLUSIVE: the sampling of a unit has not converged", "Do not use these differences.")
+    clear = sum(r["verdict"] in ("greater", "less") for r in rows)
+    same = sum(r["verdict"] == "equivalent" for r in rows)
+    text = (
+        f"Of {len(rows)} comparisons of an indicator at one rate and amplitude, {clear} differ clearly, {same} are equivalent "
+        f"within ±{100 * result['rope']:.3g} % and {len(rows) - clear - same} are undecided, each at a probability of "
+        f"{100 * result['clear']:.3g} %."
+    )
+    return Banner("good", "COMPARED at matched rate and amplitude", text)
+
+
+def _identity(result):
+    rows = []
+    for name, unit, fit in zip(result["names"], result["units"], result["reproduction"], strict=True):
+        about = (unit.get("identity") or {}).get("description") or ""
+        digest = fit.get("data_sha256", "")
+        rows.append((free(name, 24), free(f"{about}{'; ' if about else ''}data SHA-256 {digest[:12]}…" if digest else about)))
+    return Facts(rows)
+
+
+def _key_tables(result):
+    """The six key indicators of every pair at one condition, for at most two pairs."""
+    blocks = []
+    for pair in [p for p in result["pairs"] if p["conditions"]][:2]:
+        best = min(pair["conditions"], key=_from_default)
+        blocks += [Heading(f"{free(pair['first'], 40)} and {free(pair['second'], 40)} at {_at(best)}"), _table(pair, best, KEY)]
+    return [*blocks, Note(_legend(result))]
+
+
+def _from_default(condition):
+    """The largest amplitude first, then the rate nearest to the default one."""
+    return -float(f"{condition['amplitude_Nm']:.2g}"), abs(condition["loading_rate_Nm_per_s"] - DEFAULT_RATE)
+
+
+def _legend(result):
+    return (
+        f"Median [{level_text(result['level'])} interval]. Ratio: first over second. “Greater” and “less” are said of the first, "
+        f"where it differs by more than {100 * result['rope']:.3g} % with a probability of {100 * result['clear']:.3g} %. "
+        "P(first larger): the probability that the first is larger at all."
+    )
+
+
+def _at(condition):
+    return f"{condition['loading_rate_Nm_per_s']:.2g} N·m/s, ±{condition['amplitude_Nm']:.2g} N·m"
+
+
+def _table(pair, condition, names):
+    rows = []
+    for name in (n for n in names if n in condition["indicators"]):
+        row = condition["indicators"][name]
+        factor, unit = _shown_unit(row)
+        rows.append(
+            [
+                f"{indicator_words(name)} [{unit or '–'}]",
+                interval_text(row["first"], factor),
+                interval_text(row["second"], factor),
+                interval_text(row["ratio"]) if row["ratio"] else interval_text(row["difference"], factor),
+                probability_text(row["probability_first_greater"]),
+                row["verdict"],
+            ]
+        )
+    columns = ["Indicator", free(pair["first"], 24), free(pair["second"], 24), "Ratio", "P(first larger)", "Verdict"]
+    return Table(columns, rows, [1.6, 1.4, 1.4, 1.4, 0.6, 0.8])
+
+
+def _shown_unit(row):
+    """Display unit of a row; small torques in mN·m."""
+    factor, unit = display_unit(row["unit"])
+    small = unit == "N·m" and max(row["first"]["median"], row["second"]["median"]) < 0.1
+    return (1e3, "mN·m") if small else (factor, unit)
+
+
+def _all_tables(result):
+    blocks = []
+    for pair in result["pairs"]:
+        for condition in pair["conditions"]:
+            predicted = f", predicted for {free(', '.join(condition['predicted']))}" if condition["predicted"] else ""
+            title = f"{free(pair['first'], 40)} and {free(pair['second'], 40)} at {_at(condition)}{predicted}"
+            blocks += [Heading(title), _table(pair, condition, list(condition["indicators"]))]
+            if condition["not_compared"]:
+                why = "; ".join(f"{indicator_words(n)}: {free(t)}" for n, t in condition["not_compared"].items())
+                blocks.append(Note(f"Not compared: {why}."))
+    return [*blocks, Note(_legend(result))] if blocks else []
+
+
+def _mechanism(result):
+    keys = ("S_g_over_S", "S_f_over_S", "rest_over_S", "elastic_share")
+    rows = [
+        [[free(m["unit"], 40), _at(r)], *(interval_text(r[k]) for k in keys)]
+        for m in result["mechanism"]
+        for r in m["records"]
+    ]
+    return [
+        Table(["Unit", "S_g/S [–]", "S_f/S [–]", "model error/S [–]", "given back/W_abs [–]"], rows, [1.1, 1.1, 1.1, 1.1, 1.15]),
+        Note(
+            "S_g, S_f: energy that geometric error and friction dissipate in a cycle. Given back: (W_abs − S)/W_abs, stored "
+            f"elastically. Medians with {level_text(result['level'])} intervals."
+        ),
+    ]
+
+
+def _refused(result):
+    rows = [
+        [free(r["unit"], 40), free(r["record"], 60), free(r["against"], 40), free(r["reason"])]
+        for p in result["pairs"]
+        for r in p["refused"]
+    ]
+    if not rows:
+        return []
+    return [
+        Heading("Not compared"),
+        Paragraph("An amplitude within the measured one can be predicted, a rate that was not measured cannot."),
+        Table(["Unit", "Loop", "against", "Reason"], rows, [0.9, 1.2, 0.9, 2.4]),
+    ]
+
+
+def _reproduction(result):
+    rows = []
+    for name, fit in zip(result["names"], result["reproduction"], strict=True):
+        rows.append((free(name, 24), f"seed {fit.get('seed', '–')}; data SHA-256 {fit.get('data_sha256', '–')}"))
+    versions = sorted({str(f["versions"]) for f in result["reproduction"] if "versions" in f})
+    return [Heading("Reproduction"), Facts([*rows, *(("Software", v) for v in versions)])]

@@ -1,0 +1,125 @@
+"""`accept` and `compare` on former fits: exit codes, files, and one clear line for what a user gets wrong."""
+
+import json
+
+import pytest
+from support.decided import TYPICAL, diagnosis, write_evidence
+
+from backdrive_bayes.commands.main import main
+
+AREA = TYPICAL["loop_area_J"]
+
+
+@pytest.fixture(scope="module")
+def fits(tmp_path_factory):
+    room = tmp_path_factory.mktemp("fits")
+    write_evidence(room / "a", name="a")
+    write_evidence(room / "b", name="b", seed=1, loop_area_J=2 * AREA)
+    write_evidence(room / "c", name="c", converged=False)
+    write_evidence(room / "gap", name="a", diagnosis=diagnosis(["unknown"], unknown=0.9, none=0.1))
+    write_evidence(room / "other-model", name="a", effects=["sensor_lag"], loop_area_J=3 * AREA)
+    return room
+
+
+def limits(tmp_path, text):
+    path = tmp_path / "limits.toml"
+    path.write_text(text)
+    return str(path)
+
+
+def area(tmp_path, factor):
+    return limits(tmp_path, f"[loop_area_J]\nmax = {AREA * factor}\nat = {{loading_rate_Nm_per_s = 0.05}}\n")
+
+
+@pytest.mark.parametrize(("factor", "code", "verdict"), [(1.1, 0, "accepted"), (0.9, 3, "rejected"), (1.005, 4, "inconclusive")])
+def test_accept_by_its_exit_code(fits, tmp_path, capsys, factor, code, verdict):
+    out = tmp_path / "out"
+    assert main(["accept", str(fits / "a"), "--limits", area(tmp_path, factor), "-o", str(out)]) == code
+    found = json.loads((out / "verdict.json").read_text())
+    assert found["verdict"] == verdict and found["schema"] == "backdrive-bayes/verdict/1"
+    assert found["limits"][0]["min"] is None, "an open side is null"
+    assert (out / "figures" / "acceptance.svg").exists()
+    said = capsys.readouterr().out
+    assert verdict.upper() in said and ("next:" in said) == (verdict == "inconclusive")
+
+
+def test_structure_speaks_through_the_exit_code(fits, tmp_path):
+    good = area(tmp_path, 1.1)
+    assert main(["accept", str(fits / "c"), "--limits", good, "-o", str(tmp_path / "1"), "--no-figures"]) == 4
+    assert main(["accept", str(fits / "gap"), "--limits", good, "-o", str(tmp_path / "2"), "--no-figures"]) == 4
+    model = f"{fits / 'other-model'}=0.4"
+    assert main(["accept", str(fits / "a"), "--limits", good, "--model", model, "-o", str(tmp_path / "3"), "--no-figures"]) == 4
+    found = json.loads((tmp_path / "3" / "verdict.json").read_text())
+    assert [m["probability"] for m in found["structure"]["models"]] == [pytest.approx(0.6), pytest.approx(0.4)]
+
+
+def test_a_former_fit_keeps_its_verdict_beside_it(tmp_path):
+    folder = write_evidence(tmp_path / "fit")
+    before = (folder / "posterior.nc").read_bytes()
+    assert main(["accept", str(folder), "--limits", area(tmp_path, 1.1), "--no-figures"]) == 0
+    assert (folder / "verdict.json").exists() and (folder / "posterior.nc").read_bytes() == before
+
+
+def test_the_same_call_gives_the_same_bytes(fits, tmp_path):
+    for name in ("1", "2"):
+        main(["accept", str(fits / "a"), "--limits", area(tmp_path, 1.005), "-o", str(tmp_path / name), "--no-figures"])
+        main(["compare", str(fits / "a"), str(fits / "b"), "--claims", "paper", "-o", str(tmp_path / name), "--no-figures"])
+    for file in ("verdict.json", "comparison.json"):
+        assert (tmp_path / "1" / file).read_bytes() == (tmp_path / "2" / file).read_bytes()
+
+
+def test_compare_with_claims(fits, tmp_path, capsys):
+    own = tmp_path / "claims.toml"
+    claim = 'text = "A loses less"\nholds = "A.loop_area_J < B.loop_area_J"\nevery = "rate"'
+    own.write_text(f'schema = "backdrive-bayes/claims/1"\n[[claim]]\n{claim}')
+    out = tmp_path / "out"
+    assert main(["compare", str(fits / "a"), str(fits / "b"), "--claims", str(own), "-o", str(out)]) == 0
+    found = json.loads((out / "comparison.json").read_text())
+    assert found["claims"]["claims"][0]["verdict"] == "holds" and found["names"] == ["a", "b"]
+    assert found["pairs"][0]["conditions"][1]["indicators"]["loop_area_J"]["verdict"] == "less"
+    assert (out / "figures" / "comparison-ratios.svg").exists()
+    assert "A loses less: holds" in capsys.readouterr().out
+    assert main(["compare", str(fits / "a"), str(fits / "c"), "-o", str(tmp_path / "2"), "--no-figures"]) == 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["accept", "{a}"], "--limits"),
+        (["accept", "{a}", "--limits", "{none}"], "nothing there"),
+        (["accept", "{none}", "--limits", "{good}"], "nothing there"),
+        (["accept", "{a}", "--limits", "{unknown}"], "did you mean loop_area_J"),
+        (["accept", "{a}", "--limits", "{rate}"], "was not measured"),
+        (["accept", "{a}", "--limits", "{good}", "--model", "{b}"], "OUT=PROBABILITY"),
+        (["accept", "{a}", "--limits", "{good}", "--model", "{b}=0.5"], "of one unit"),
+        (["accept", "{a}", "--limits", "{good}", "--model", "{a}=1.5"], "leave some for UNIT"),
+        (["accept", "{a}", "--limits", "{good}", "--batch", "{b}"], "at least 3 other units"),
+        (["accept", "{a}", "--limits", "{good}", "--level", "2"], "--level"),
+        (["compare", "{a}"], "two units or more"),
+        (["compare", "{a}", "{none}"], "nothing there"),
+        (["compare", "{a}", "{b}", "--rope", "0"], "--rope"),
+        (["compare", "{a}", "{b}", "--claims", "{none}"], "a claims file or 'paper'"),
+    ],
+)
+def test_every_mistake_is_one_line_and_leaves_nothing(fits, tmp_path, capsys, arguments, expected):
+    (tmp_path / "made").mkdir()
+    texts = {
+        "good": "[loop_area_J]\nmax = 1",
+        "unknown": "[loop_area]\nmax = 1",
+        "rate": "[loop_area_J]\nmax = 1\nat = {loading_rate_Nm_per_s = 0.7}",
+    }
+    for name, text in texts.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    names = {n: tmp_path / f"{n}.toml" for n in texts} | {"a": fits / "a", "b": fits / "b", "none": tmp_path / "none.toml"}
+    out = tmp_path / "made" / "out"
+    assert main([*(a.format(**names) for a in arguments), "-o", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert expected in error and error.count("\n") == 1 and "Traceback" not in error
+    assert not list((tmp_path / "made").iterdir())
+
+
+def test_a_limit_that_no_record_tells_of_is_said_before_sampling(unit_folder, tmp_path, capsys):
+    wrong = limits(tmp_path, "[loop_area_J]\nmax = 1\nat = {loading_rate_Nm_per_s = 0.01}")
+    assert main(["accept", str(unit_folder), "--limits", wrong, "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert "was not measured" in error and "warming up" not in error

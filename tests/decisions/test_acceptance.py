@@ -1,0 +1,183 @@
+"""Verdicts: what is accepted, rejected and left open, why, and what to measure next."""
+
+import math
+
+import numpy as np
+import pytest
+from support.decided import LOOPS, TYPICAL, diagnosis, evidence
+
+from backdrive_bayes.decisions.acceptance import assess, limited_loops
+from backdrive_bayes.decisions.global_risk import Process
+from backdrive_bayes.decisions.limits import Limit, Limits
+from backdrive_bayes.decisions.loops import measured_loops
+from backdrive_bayes.decisions.next_step import repeats_to_settle
+from backdrive_bayes.errors import BadInput
+
+AREA, SD = TYPICAL["loop_area_J"], 0.01 * TYPICAL["loop_area_J"]
+
+
+def area(sds, **more):
+    """An upper limit on S at 0.05 N·m/s, that many posterior standard deviations above the median."""
+    return Limit("loop_area_J", hi=AREA + sds * SD, rate=0.05, where="limits.toml, loop_area_J", **more)
+
+
+def judge(*limits, e=None, **options):
+    return assess([e or evidence()], Limits(tuple(limits)), **options)
+
+
+@pytest.mark.parametrize(
+    ("sds", "verdict"), [(3, "accepted"), (1.8, "accepted"), (1.4, "inconclusive"), (-1.0, "inconclusive"), (-1.5, "rejected")]
+)
+def test_the_verdict_follows_the_distance_in_standard_deviations(sds, verdict):
+    """z(0.95) = 1.64 above the limit accepts, z(0.90) = 1.28 below it rejects."""
+    result = judge(area(sds))
+    assert result["verdict"] == verdict
+    row = result["limits"][0]
+    assert row["specific_consumer_risk"] == pytest.approx(1 - row["conformance_probability"])
+    assert (row["median"] <= row["accept_median_between"][1]) == (verdict == "accepted")
+    assert (result["next"] is None) == (verdict != "inconclusive")
+
+
+def test_halved_intervals_would_accept_what_is_open():
+    """The planted fault that the verdict must react to."""
+    assert judge(area(1.4))["verdict"] == "inconclusive"
+    assert judge(area(1.4), e=evidence(spread=0.005))["verdict"] == "accepted"
+
+
+def test_several_limits_are_kept_together_or_not():
+    """Three independent limits with 4 % each: one alone would be accepted, all together are not."""
+    limits = [Limit("peak_angle_rad", hi=TYPICAL["peak_angle_rad"] * (1 + 0.01 * 1.75), where="w")]
+    result = judge(*limits)
+    assert [r["verdict"] for r in result["limits"]] == ["accepted"] * 3
+    assert result["verdict"] == "inconclusive"
+    alone = [r["conformance_probability"] for r in result["limits"]]
+    assert result["conformance_probability"] == pytest.approx(math.prod(alone), abs=0.02)
+    assert result["next"]["repeats_in_all"] == 2 and "Repeat the records 1 time more" in result["next"]["do"]
+
+
+def test_the_limiting_indicator_is_the_least_sure_one():
+    result = judge(area(1.4), Limit("peak_angle_rad", hi=1.0, where="w"))
+    assert result["limiting"]["indicator"] == "loop_area_J"
+    far = judge(area(4), Limit("peak_angle_rad", hi=1.0, where="w"))
+    assert far["limiting"]["indicator"] == "loop_area_J", "of two certain ones the nearer in standard deviations"
+
+
+def test_not_converged_is_inconclusive_whatever_the_numbers():
+    for sds in (30, -30):
+        result = judge(area(sds), e=evidence(converged=False))
+        assert result["verdict"] == "inconclusive" and result["reason"] == "the sampling has not converged: give it more time"
+        assert "--budget" in result["next"]["do"] and result["limits"][0]["verdict"] == "inconclusive"
+
+
+def test_an_unexplained_gap_is_inconclusive():
+    gap = diagnosis(["unknown"], unknown=0.3, none=0.1, viscoelastic_creep=0.6)
+    result = judge(area(30), e=evidence(diagnosis=gap))
+    assert result["verdict"] == "inconclusive" and "unknown" in result["reason"]
+    assert "Measure at another rate" in result["next"]["do"]
+    assert judge(area(-30), e=evidence(diagnosis=gap))["verdict"] == "inconclusive", "it may not be rejected either"
+
+
+def test_an_effect_that_the_fit_holds_is_no_gap():
+    found = diagnosis(["viscoelastic_creep"], viscoelastic_creep=0.97, none=0.03)
+    assert judge(area(30), e=evidence(diagnosis=found))["verdict"] == "inconclusive"
+    result = judge(area(30), e=evidence(diagnosis=found, effects=["viscoelastic_creep"]))
+    assert result["verdict"] == "accepted" and result["structure"]["unknown_probability"] == 0
+
+
+def test_small_probabilities_of_other_effects_add_to_the_risk():
+    found = diagnosis([], none=0.97, sensor_lag=0.03)
+    result = judge(area(30), e=evidence(diagnosis=found))
+    assert result["verdict"] == "accepted"
+    assert result["specific_consumer_risk"] == pytest.approx(0.03, abs=0.002)
+
+
+def test_models_that_stay_probable_are_averaged():
+    one, other = evidence(), evidence(effects=["sensor_lag"], loop_area_J=AREA + 8 * SD)
+    limits = Limits((area(4),))
+    mixed = assess([one, other], limits, [0.7, 0.3])
+    assert mixed["verdict"] == "inconclusive"
+    assert mixed["conformance_probability"] == pytest.approx(0.7, abs=0.01)
+    assert assess([one, other], limits, [0.97, 0.03])["verdict"] == "accepted"
+    assert assess([one, other], limits, [0.02, 0.98])["verdict"] == "rejected"
+    row = mixed["limits"][0]
+    assert row["hi"] > AREA + 7 * SD and row["lo"] < AREA, "the interval is that of the mixture"
+    assert len(mixed["structure"]["models"]) == 2
+
+
+@pytest.mark.parametrize("wrong", [[0.7, 0.4], [1.2, -0.2], [0.5], [0.0, 0.0]])
+def test_wrong_probabilities_are_refused(wrong):
+    with pytest.raises(BadInput, match="one probability a model"):
+        assess([evidence(), evidence()], Limits((area(1),)), wrong)
+    with pytest.raises(BadInput, match="a probability for each"):
+        assess([evidence(), evidence()], Limits((area(1),)))
+    with pytest.raises(BadInput, match="of one unit"):
+        assess([evidence("a"), evidence("b")], Limits((area(1),)), [0.5, 0.5])
+
+
+def test_a_broken_diagnosis_is_one_clear_line():
+    with pytest.raises(BadInput, match="diagnosis.json"):
+        judge(area(1), e=evidence(diagnosis={"which": "?"}))
+
+
+def test_limits_without_a_rate_hold_for_the_largest_loops():
+    loops = measured_loops(*zip(*LOOPS, (0.05, 0.04), strict=True))
+    everywhere = limited_loops(Limit("peak_angle_rad", hi=1.0), loops)
+    assert [x.rate for x in everywhere] == [0.01, 0.05, 0.1] and all(x.amplitude == 0.1 for x in everywhere)
+    small = limited_loops(Limit("peak_angle_rad", hi=1.0, amplitude=0.04), loops)
+    assert [x.predicted for x in small] == [True, False, True]
+
+
+def test_a_limit_that_cannot_be_told_is_one_clear_line():
+    for limit, reason in (
+        (Limit("loop_area_J", hi=1.0, rate=0.5, where="limits.toml, loop_area_J"), "was not measured"),
+        (Limit("loop_area_J", hi=1.0, amplitude=0.5, where="limits.toml, loop_area_J"), "beyond the measured"),
+        (Limit("tau1_Nm", hi=1.0, amplitude=0.05, where="limits.toml, tau1_Nm"), "measured amplitudes only"),
+        (Limit("lost_motion_rad", hi=1.0, k=0.04, where="limits.toml, lost_motion_rad"), "k = 0.04"),
+    ):
+        with pytest.raises(BadInput, match=reason) as error:
+            judge(limit)
+        assert "limits.toml" in str(error.value)
+
+
+def test_a_predicted_loop_is_to_be_measured():
+    predicted = Limit("absorbed_J", hi=0.36 * TYPICAL["absorbed_J"], rate=0.05, amplitude=0.06, where="w")
+    result = judge(predicted)
+    assert result["verdict"] == "inconclusive" and result["limits"][0]["predicted"]
+    assert "Measure a loop at 0.05 N·m/s and ±0.06 N·m itself" in result["next"]["do"]
+
+
+def test_repeats_that_would_settle():
+    """One standard deviation away, nothing shared: accepted at z(0.95)² = 2.7, so with three records."""
+
+
+    def needed(limit, share=0.0, rows=1):
+        row = {"median": 0.0, "sd": 1.0, "model_error_share": share, "min": -math.inf, "max": limit}
+        return repeats_to_settle([row] * rows, 0.05, 0.1)
+
+    assert needed(1.0) == 3 and needed(1.0, rows=3) > 3
+    assert needed(5.0) == 2, "one more at least"
+    assert needed(1.0, share=1.0) is None, "model error does not repeat away"
+    assert needed(1.0, share=0.2) > 3
+    assert needed(-0.1) is None, "on the limit nothing settles"
+    text = judge(area(1.0))["next"]
+    assert text["repeats_in_all"] == 4 and "3 times more" in text["do"]
+    stuck = judge(area(0.5))
+    assert stuck["next"]["repeats_in_all"] is None or stuck["next"]["repeats_in_all"] > 8
+
+
+def test_global_risks_come_with_process_knowledge_or_a_batch():
+    assert judge(area(3))["limits"][0]["global"] is None
+    stated = judge(area(3, process=Process(AREA, 3 * SD)))["limits"][0]["global"]
+    assert stated["nonconforming"] == pytest.approx(0.159, abs=0.01) and stated["consumer"] < 0.01 < stated["inconclusive"]
+    rng = np.random.default_rng(0)
+    batch = [evidence(f"b{i}", seed=i, loop_area_J=AREA + 3 * SD * rng.standard_normal()) for i in range(12)]
+    told = judge(area(3), batch=batch)["limits"][0]["global"]
+    assert told["batch_units"] == 12 and 1.5 * SD < told["process"]["sd"] < 6 * SD
+    with pytest.raises(BadInput, match="at least 3 other units"):
+        judge(area(3), batch=batch[:2])
+
+
+def test_the_naive_decision_stands_beside():
+    row = judge(area(3))["limits"][0]
+    assert row["naive"] == {"value": 3.0e-4, "inside": True}
+    assert judge(Limit("peak_angle_rad", hi=1.0, where="w"))["limits"][0]["naive"]["value"] is None

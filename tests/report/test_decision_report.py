@@ -1,0 +1,125 @@
+"""The PDF holds the numbers of verdict.json and comparison.json, with their levels and units."""
+
+import io
+import json
+import re
+
+import pypdf
+import pytest
+from support.decided import diagnosis, evidence
+
+from backdrive_bayes.commands.output import write_json
+from backdrive_bayes.decisions.acceptance import assess
+from backdrive_bayes.decisions.claims import read_claims
+from backdrive_bayes.decisions.comparison import compare
+from backdrive_bayes.decisions.global_risk import Process
+from backdrive_bayes.decisions.limits import Limit, Limits
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.report import report
+from backdrive_bayes.report.numbers import interval_text, probability_text
+
+ARCMIN = 10800 / 3.141592653589793
+HOSTILE = "#strong[x] $y$ *b* @ref"
+
+
+def pages(folder):
+    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([folder])))
+    return [" ".join(p.extract_text().split()) for p in reader.pages], reader
+
+
+@pytest.fixture(scope="module")
+def verdict(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("verdict")
+    limits = (
+        Limit("lost_motion_rad", hi=0.0096, rate=0.05),
+        Limit("loop_area_J", lo=3e-4, hi=4e-4, process=Process(3.7e-4, 1e-5)),
+        Limit("absorbed_J", hi=6e-4, rate=0.05, amplitude=0.06),
+    )
+    write_json(folder / "verdict.json", assess([evidence(HOSTILE)], Limits(limits)))
+    return json.loads((folder / "verdict.json").read_text()), *pages(folder)
+
+
+def test_the_first_page_can_be_signed(verdict):
+    result, text, _ = verdict
+    first = text[0]
+    assert "INCONCLUSIVE" in first and "Signature" in first and "Next:" in first
+    assert HOSTILE in first and result["reproduction"]["data_sha256"] in first
+    assert "k = 0.03" in first and "90 %" in first and "consumer's 5 %, producer's 10 %" in first
+    assert "predicted" in first
+
+
+def test_every_limit_stands_with_its_numbers(verdict):
+    result, text, _ = verdict
+    whole = " ".join(text)
+    for row in result["limits"]:
+        factor = ARCMIN if row["unit"] == "rad" else 1e3
+        assert interval_text(row, factor) in whole
+        assert probability_text(row["conformance_probability"]) in whole
+        assert probability_text(row["specific_consumer_risk"]) in whole
+    for row in (r for r in result["limits"] if r["global"]):
+        assert probability_text(row["global"]["consumer"]) in whole
+    assert "JCGM 106:2012" in whole and "Global risks" in whole and "0.3 to 0.4" in whole
+
+
+def test_what_is_uncovered_is_named(tmp_path):
+    found = diagnosis(["sensor_lag"], sensor_lag=0.8, none=0.2)
+    write_json(tmp_path / "verdict.json", assess([evidence(diagnosis=found)], Limits((Limit("peak_angle_rad", hi=1.0),))))
+    text, _ = pages(tmp_path)
+    assert "sensor lag (80 %)" in text[0] and "in no model at hand: sensor lag" in " ".join(text)
+
+
+@pytest.fixture(scope="module")
+def comparison(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("comparison")
+    a, b = evidence("metal"), evidence("plastic", seed=1, loop_area_J=1.9e-3, loops=((0.05, 0.1), (0.5, 0.1)))
+    write_json(folder / "comparison.json", compare([a, b], read_claims("paper")))
+    return json.loads((folder / "comparison.json").read_text()), *pages(folder)
+
+
+def test_a_comparison_holds_its_numbers(comparison):
+    result, text, _ = comparison
+    whole = " ".join(text)
+    (condition,) = result["pairs"][0]["conditions"]
+    for name in ("loop_area_J", "peak_angle_rad"):
+        row = condition["indicators"][name]
+        assert interval_text(row["ratio"]) in text[0]
+        assert interval_text(row["first"], ARCMIN if row["unit"] == "rad" else 1e3) in text[0]
+    assert "rates cannot be predicted" in whole and "Not compared" in whole
+    assert "90 % interval" in text[0] and "±5 %" in text[0]
+
+
+def test_claims_stand_with_probability_and_verdict(comparison):
+    result, text, _ = comparison
+    whole = " ".join(text)
+    for claim in result["claims"]["claims"]:
+        start = re.escape(claim["claim"][:24])
+        assert re.search(start, whole), claim["claim"]
+    assert "does not hold" in whole and "not answered" in whole and "unit U was not given" in whole
+
+
+def test_tags_and_outline(comparison, verdict):
+    for _, _, reader in (comparison, verdict):
+        assert reader.trailer["/Root"]["/MarkInfo"]["/Marked"]
+    titles = [i.title for i in comparison[2].outline if not isinstance(i, list)]
+    assert titles[0] == "Comparison: metal, plastic"
+
+
+def test_all_results_of_a_folder_make_chapters(tmp_path):
+    from support_results import write_result
+
+    write_result(tmp_path, records=1)
+    (tmp_path / "posterior.nc").unlink()
+    write_json(tmp_path / "verdict.json", assess([evidence("u")], Limits((Limit("peak_angle_rad", hi=1.0),))))
+    text, _ = pages(tmp_path)
+    assert "ACCEPTED" in text[0] and "CONVERGED" in text[1]
+
+
+def test_an_incomplete_verdict_is_one_clear_line(tmp_path):
+    write_json(tmp_path / "verdict.json", {"schema": "backdrive-bayes/verdict/1"})
+    with pytest.raises(BadInput, match="complete result file"):
+        report.report_bytes([tmp_path])
+
+
+def test_probabilities_are_never_rounded_to_certainty():
+    shown = [probability_text(p) for p in (0.99999, 0.9999, 0.995, 0.5, 0.004, 1e-5, None)]
+    assert shown == ["> 0.999", "> 0.999", "0.995", "0.50", "0.004", "< 0.001", "–"]

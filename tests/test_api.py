@@ -1,0 +1,99 @@
+"""The five lines of the README, results that show themselves, and the example scripts with a small budget."""
+
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from support.decided import evidence, write_evidence
+
+from conftest import ramps, write_csv  # isort: skip
+
+import backdrive_bayes
+from backdrive_bayes.decisions.limits import Limit, Limits
+
+ROOT = Path(__file__).resolve().parents[1]
+SECONDS = "1"
+
+
+def test_results_show_themselves_and_escape_what_others_wrote(tmp_path):
+    verdict = backdrive_bayes.accept(evidence("<script>"), Limits((Limit("peak_angle_rad", hi=1.0),)))
+    assert verdict.verdict == "accepted" and "<script>: accepted" in str(verdict)
+    shown = verdict._repr_html_()
+    assert "&lt;script&gt;" in shown and "<script>" not in shown and "at most 1" in shown and "above 0.999" in shown
+    comparison = backdrive_bayes.compare(evidence("a"), evidence("<b>"), claims="paper")
+    assert len(comparison.claims) == 33 and "&lt;b&gt;" in comparison._repr_html_()
+
+
+def test_saved_fits_are_as_good_as_fresh_ones(tmp_path):
+    folder = write_evidence(tmp_path / "fit", seed=3)
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[loop_area_J]\nmax = 4e-4")
+    saved, fresh = (backdrive_bayes.accept(e, limits).result for e in (folder, evidence(seed=3)))
+    assert saved["conformance_probability"] == fresh["conformance_probability"]
+
+
+def test_report_can_be_called_however_it_was_found(tmp_path):
+    verdict = backdrive_bayes.accept(evidence(), Limits((Limit("peak_angle_rad", hi=1.0),)))
+    assert backdrive_bayes.report(verdict, out=tmp_path).stat().st_size > 10_000
+    import_module("backdrive_bayes.report.report")
+    assert backdrive_bayes.report(verdict, out=tmp_path / "again").exists()
+
+
+def test_unknown_names_are_attribute_errors():
+    assert {"fit", "accept", "compare", "report", "Unit"} <= set(dir(backdrive_bayes))
+    with pytest.raises(AttributeError, match="nothing_of_ours"):
+        _ = backdrive_bayes.nothing_of_ours
+
+
+@pytest.fixture(scope="module")
+def units(tmp_path_factory):
+    """Two small units of one short record each."""
+    import numpy as np
+    from conftest import answer
+
+    folders = []
+    for name, compliance in (("a", 0.01), ("b", 0.02)):
+        folder = tmp_path_factory.mktemp(name)
+        time, torque = ramps(noise=0.002)
+        rng = np.random.default_rng(len(name))
+        angle = answer(torque, compliance=compliance) * 10800 / np.pi + 0.1 * rng.normal(size=len(time))
+        write_csv(folder / "a.csv", time, torque, angle)
+        (folder / "unit.toml").write_text(
+            f'schema = "backdrive-bayes/unit/1"\nname = "{name}"\nrated_torque_Nm = 1.0\n[[record]]\nfile = "a.csv"\n'
+        )
+        folders.append(folder)
+    return folders
+
+
+def run(script, *arguments):
+    code = ["-W", "ignore", str(ROOT / "examples" / script), *map(str, arguments)]
+    done = subprocess.run([sys.executable, *code], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_example_five_lines(units, tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[peak_angle_rad]\nmax = 1")
+    said = run("five_lines.py", units[0], "--limits", limits, "--budget", SECONDS, "--out", tmp_path / "out")
+    assert said.startswith("a: ") and (tmp_path / "out" / "report.pdf").exists()
+
+
+def test_example_compare_units(units, tmp_path):
+    said = run("compare_units.py", *units, "--budget", SECONDS, "--out", tmp_path / "out")
+    assert "A turns less than B at every rate" in said and (tmp_path / "out" / "report.pdf").exists()
+
+
+def test_example_acceptance_by_batch(units, tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[peak_angle_rad]\nmax = 1")
+    said = run("acceptance_by_batch.py", units[0], *[units[1]] * 3, "--limits", limits, "--budget", SECONDS)
+    assert "global risks: {" in said
+
+
+def test_every_example_is_run_here():
+    scripts = {p.name for p in (ROOT / "examples").glob("*.py") if not p.name.startswith("_")}
+    text = Path(__file__).read_text(encoding="utf-8")
+    assert scripts and all(f'"{name}"' in text for name in scripts)
