@@ -1,5 +1,6 @@
 """The five lines of the README, results that show themselves, and the example scripts with a small budget."""
 
+import os
 import subprocess
 import sys
 from importlib import import_module
@@ -91,6 +92,24 @@ def test_example_acceptance_by_batch(units, tmp_path):
     limits.write_text("[peak_angle_rad]\nmax = 1")
     said = run("acceptance_by_batch.py", units[0], *[units[1]] * 3, "--limits", limits, "--budget", SECONDS)
     assert "global risks: {" in said
+
+
+def test_example_own_effect():
+    assert "loose_plate: -1.00 to 1.00 mrad" in run("own_effect.py")
+
+
+def test_an_effect_of_ones_own_is_registered_from_outside(tmp_path):
+    """What an installed package with the entry point looks like: a .dist-info folder on the path."""
+    info = tmp_path / "loose-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: loose\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[backdrive_bayes.effects]\nloose_plate = loose_plate:LoosePlate\n")
+    (tmp_path / "loose_plate.py").write_text((ROOT / "examples" / "own_effect.py").read_text(encoding="utf-8"), encoding="utf-8")
+    code = "from backdrive_bayes.model import registry; print('loose_plate' in registry.candidates_beside(registry.BASELINE))"
+    for path, known in ((str(tmp_path), "True"), ("", "False")):
+        environment = os.environ | {"PYTHONPATH": path}
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+        assert done.stdout.strip() == known, done.stderr
 
 
 def test_every_example_is_run_here():
