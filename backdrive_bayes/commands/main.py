@@ -15,6 +15,7 @@ VERBS = {
     "fit": "fit",
     "compare": "compare",
     "accept": "accept",
+    "diagnose": "diagnose",
     "predict": "predict",
     "simulate": "simulate",
     "blind": "blind",

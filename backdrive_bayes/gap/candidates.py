@@ -71,13 +71,13 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
     for name in names:
         note(f"effect {name}")
         screens[name] = screen(setting, none, name, reference, rng)
-        singles[name] = fit_screened(screens[name], (name,))
+        singles[name] = fit_screened(screens[name], (name,), rng)
     weighed = [_weigh(setting, f) for f in (none, *singles.values())]
     for pair in _promising_pairs(none, singles, screens, reference):
         note(f"effects {' + '.join(pair)}")
         known, other = sorted(pair, key=lambda n: -max(_weigh(setting, singles[n]).log_evidence))
         found = screen(setting, singles[known], other, reference, rng, 128)
-        weighed.append(_weigh(setting, fit_screened(found, pair)))
+        weighed.append(_weigh(setting, fit_screened(found, pair, rng)))
     weighed = _polish_best(setting, weighed, rng)
     best = max(weighed[1 : len(names) + 1], key=lambda w: w.log_evidence.max(), default=weighed[0])
     unexplained = np.array([_unexplained(setting, fitted) for fitted in (none, best.fitted)])

@@ -10,7 +10,7 @@ from backdrive_bayes.gap.setting import JointProblem, Setting, Whitening
 from backdrive_bayes.inference.optimum import find_optimum
 from backdrive_bayes.inference.starts import FEATURE_STARTS, feature_starts
 from backdrive_bayes.model.reducer import ReducerModel
-from backdrive_bayes.model.registry import members_named
+from backdrive_bayes.model.registry import BASELINE, members_named
 
 SCREENED = 256
 STARTS = 2
@@ -141,9 +141,12 @@ def fit_none(setting: Setting, whitening: Whitening) -> Fitted:
     return fit_from(joint_problem(setting, (), whitening), (), [setting.z])
 
 
-def fit_screened(found: Screen, effects) -> Fitted:
-    """The best mode from the starts of a screen."""
-    return fit_from(found.problem, effects, found.starts)
+def fit_screened(found: Screen, effects, rng) -> Fitted:
+    """The best mode from the starts of a screen; a module that the baseline was left without is also read off the loop."""
+    starts = found.starts
+    if set(effects) & set(BASELINE):
+        starts = np.concatenate([starts, feature_starts(found.problem, rng)])
+    return fit_from(found.problem, effects, starts)
 
 
 def rebased(fitted: Fitted, other: Fitted) -> Fitted:
