@@ -13,7 +13,8 @@ def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0)
     """Covariance of the block means of the angle [rad²], shape (blocks, blocks).
 
     The correlated part is the mean of σ² exp(-|t-t'|/t_c) over all pairs of samples of two blocks, as geometric sums; the white
-    part falls with the number of samples; the torque path's error enters through ``slope_rad_per_nm`` (blocks,).
+    part falls with the number of samples; the torque path's error, of each block and of its leg as a whole, enters through
+    ``slope_rad_per_nm`` (blocks,).
     """
     n, span = blocks.count, blocks.end_s - blocks.begin_s
     # Samples some hundred correlation times apart are independent to the last bit.
@@ -27,7 +28,23 @@ def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0)
     matrix *= noise.correlated_rad**2
     white = noise.white_rad**2 / blocks.count
     matrix[np.diag_indices_from(matrix)] += white + slope_rad_per_nm**2 * blocks.torque_variance_nm2
-    return matrix
+    return matrix + _path_covariance(blocks, slope_rad_per_nm)
+
+
+def _path_covariance(blocks, slope):
+    """Error of the straight torque path through each leg, in level and tilt, seen through the slope; (blocks, blocks)."""
+    size = slope * np.sqrt(blocks.torque_trend_nm2)
+    if np.ndim(size) == 0:
+        return 0.0
+    legs = np.arange(blocks.direction.size)
+    middle, half = (
+        np.array([f(blocks.begin_s[blocks.leg == k][0], blocks.end_s[blocks.leg == k][-1]) for k in legs])[blocks.leg]
+        for f in (lambda a, b: 0.5 * (a + b), lambda a, b: 0.5 * (b - a))
+    )
+    along = (blocks.mid_s - middle) / half
+    same = blocks.leg[:, None] == blocks.leg
+    # Level and tilt of a line fitted to evenly spaced samples are independent; the tilt's share at the ends is three.
+    return same * np.outer(size, size) * (1 + 3 * np.outer(along, along))
 
 
 def whitener(covariance: np.ndarray) -> np.ndarray:

@@ -23,7 +23,8 @@ class Blocks:
     ``torque_nm`` is the smooth torque path at the block, ``torque_variance_nm2`` what is left of the torque channel's noise
     in it; ``begin_s`` and ``end_s`` bound the block in time, ``count`` is its number of samples. ``leg`` numbers the
     monotone legs, ``turning_nm`` (shape (legs + 1,)) are the torques at their ends, ``direction`` (legs,) is ±1.
-    ``bend_rad`` is what has been taken off the mean angle for the curve's bend within the block.
+    ``bend_rad`` is what has been taken off the mean angle for the curve's bend within the block. ``torque_trend_nm2`` is the
+    variance of the level of the leg's straight torque path, an error that all blocks of a leg share.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Blocks:
     turning_nm: np.ndarray
     direction: np.ndarray
     bend_rad: np.ndarray
+    torque_trend_nm2: np.ndarray | float = 0.0
 
     @property
     def mid_s(self) -> np.ndarray:
@@ -72,7 +74,7 @@ def reduce_record(record: Record, segments, noise: NoiseEstimate, blocks_per_seg
     starts = np.concatenate(edges)
     stops = np.r_[starts[1:], segments[-1].stop]
     count = stops - starts
-    path, variance, turning = _smooth_torque(record, segments, starts, stops, np.array(leg), noise.torque_nm)
+    path, variance, trend, turning = _smooth_torque(record, segments, starts, stops, np.array(leg), noise.torque_nm)
     return Blocks(
         name=record.name,
         torque_nm=path,
@@ -85,6 +87,7 @@ def reduce_record(record: Record, segments, noise: NoiseEstimate, blocks_per_seg
         turning_nm=turning,
         direction=np.array([s.direction for s in segments]),
         bend_rad=np.zeros(count.size),
+        torque_trend_nm2=trend,
     )
 
 
@@ -107,11 +110,11 @@ def _block_edges(angle, wanted, noise):
 
 
 def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
-    """Torque path at the blocks, its error variance, and the turning torques."""
+    """Torque path at the blocks, its error variance of each block alone and in common with its leg, and the turning torques."""
     count = stops - starts
     mean = np.add.reduceat(record.torque_nm, starts) / count
     mid = np.add.reduceat(record.time_s, starts) / count
-    path, variance = np.empty_like(mean), np.empty_like(mean)
+    path, variance, common = np.empty((3, mean.size))
     ends = np.empty((len(segments), 2))
     # Turning points lie between the last sample of one segment and the first of the next.
     inner = [0.5 * (record.time_s[s.start - 1] + record.time_s[s.start]) for s in segments[1:]]
@@ -127,12 +130,13 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
         level = level + keep * (mean[own] - level)
         path[own] = isotonic_regression(s.direction * level, weights=count[own]).x * s.direction
         variance[own] = torque_sd**2 * (keep / count[own] + 2.0 / count[own].sum())
+        common[own] = torque_sd**2 / count[own].sum()
         ends[k] = at_ends
     turning = np.r_[ends[0, 0], 0.5 * (ends[:-1, 1] + ends[1:, 0]), ends[-1, 1]]
     for k in range(len(segments)):
         own = leg == k
         path[own] = np.clip(path[own], *sorted(turning[k : k + 2]))
-    return path, variance, turning
+    return path, variance, common, turning
 
 
 def _trend(time, mean, count, torque_sd, bounds):
