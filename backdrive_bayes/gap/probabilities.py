@@ -21,7 +21,7 @@ class Calibration:
     """Temperatures of slow and fast evidences, and prior weights; misfit weights follow ``MISFIT_LEVELS``."""
 
     temperature: float = 4.0
-    fast_temperature: float = 2.5
+    fast_temperature: float = 4.0
     none: float = 0.3
     single: float = 0.4
     pair: float = 0.08
