@@ -56,6 +56,8 @@ class Settings:
     warm_up_blocks: int = 6
     refits: int = 3
     kept_per_ensemble: int = 1500
+    burn_in_moves: float = 12.0
+    longest_burn_in: int = 200
     max_seconds: float = 120.0
     good_share: float = 0.15
 
@@ -160,7 +162,12 @@ def _begin(log_posterior, proposal, states, refits_left, rng, settings):
     dimension = proposal.mean.shape[1]
     samplers = tuple(_sampler(_walkers(settings, dimension), dimension, log_posterior, _moves(proposal), rng) for _ in states)
     for sampler, state in zip(samplers, states, strict=True):
-        sampler.run_mcmc(state, settings.block // 2, skip_initial_state_check=True)
+        state = sampler.run_mcmc(state, settings.block // 2, skip_initial_state_check=True)
+        # All ensembles start from the same approximation, so that R-hat cannot see a walker that has not left it yet.
+        moves = settings.block // 2 * max(float(sampler.acceptance_fraction.mean()), 1e-3)
+        rest = int(np.ceil((settings.burn_in_moves / moves - 1) * (settings.block // 2)))
+        if rest > 0:
+            sampler.run_mcmc(state, min(rest, settings.longest_burn_in), skip_initial_state_check=True)
         sampler.reset()
     return Chains(samplers, proposal, refits_left)
 

@@ -15,7 +15,7 @@ from backdrive_bayes.inference.fit import BASELINE, fit
 from backdrive_bayes.inference.problem import Problem
 from backdrive_bayes.inference.sampling import Settings
 
-NO_TIME = Settings(max_seconds=0.0)
+NO_TIME = Settings(max_seconds=0.0, walkers=40, block=10)
 
 
 UNIT = unit_of(3)

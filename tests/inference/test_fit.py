@@ -13,7 +13,7 @@ from backdrive_bayes.inference.fit import fit
 from backdrive_bayes.inference.sampling import Settings
 
 K = 0.03
-BRIEF = Settings(max_seconds=0.0, block=30, kept_per_ensemble=400)
+BRIEF = Settings(max_seconds=0.0, walkers=40, block=20, kept_per_ensemble=400)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from backdrive_bayes.inference.fit import fit
 from backdrive_bayes.inference.posterior_file import posterior_groups, write_posterior
 from backdrive_bayes.inference.sampling import Settings
 
-BRIEF = Settings(max_seconds=0.0, block=30, kept_per_ensemble=400)
+BRIEF = Settings(max_seconds=0.0, walkers=40, block=20, kept_per_ensemble=400)
 
 
 def offset_gap(baseline):
