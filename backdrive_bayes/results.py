@@ -8,8 +8,10 @@ from pathlib import Path
 from backdrive_bayes.errors import BadInput
 
 INDICATORS = "backdrive-bayes/indicators/1"
+DIAGNOSIS = "backdrive-bayes/diagnosis/1"
 VERDICT = "backdrive-bayes/verdict/1"
 COMPARISON = "backdrive-bayes/comparison/1"
+BLIND = "backdrive-bayes/blind/1"
 POSTERIOR = "backdrive-bayes/posterior/1"
 
 

@@ -15,8 +15,8 @@ from backdrive_bayes.blind.request import LISTED, Request
 from backdrive_bayes.blind.scoring import score
 from backdrive_bayes.blind.workers import run_all
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.results import BLIND
 
-SCHEMA = "backdrive-bayes/blind/1"
 ROUNDS = ("blind", "oracle", "removed")
 
 
@@ -55,7 +55,7 @@ def run_study(study: Study) -> dict:
         (study.out / seal.KEY).write_bytes(data)
     key = read_key((study.out / seal.KEY).read_bytes(), seal.published(study.out))
     answers = {kind: _read(study, kind, _calls(study, kind, key["units"])) for kind in ROUNDS}
-    head = {"schema": SCHEMA, "key_sha256": digest(data), "request": key["request"]}
+    head = {"schema": BLIND, "key_sha256": digest(data), "request": key["request"]}
     return head | score(key, answers["blind"], answers["oracle"], answers["removed"])
 
 

@@ -23,8 +23,8 @@ from backdrive_bayes.decisions.next_step import advice, repeats_to_settle
 from backdrive_bayes.decisions.structure import Structure, weigh
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
+from backdrive_bayes.results import VERDICT
 
-SCHEMA = "backdrive-bayes/verdict/1"
 BINS = 60
 FEWEST_UNITS = 3
 _EXPLAIN = "Fit with the effects that the diagnosis names, or give their models with --model."
@@ -63,7 +63,7 @@ def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
     limiting = min(range(len(rows)), key=lambda i: (round(rows[i]["conformance_probability"], 4), _margin(rows[i])))
     first = structure.models[0].evidence
     return {
-        "schema": SCHEMA,
+        "schema": VERDICT,
         "unit": first.name,
         "verdict": verdict.value,
         "reason": reason,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -14,13 +13,14 @@ from backdrive_bayes.decisions.expression import Expression, Wrong
 from backdrive_bayes.decisions.loops import SAME_RATE, NotAvailable, same
 from backdrive_bayes.decisions.quantities import Quantities
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.records.toml_file import read_toml
 
 SCHEMA = "backdrive-bayes/claims/1"
 PAPER = "paper"
 HOLDS, FAILS = 0.95, 0.05
 _KEYS = ("id", "text", "holds", "probability", "every", "along", "rate", "amplitude", "from", "to", "note")
 _ALONG = ("rate", "amplitude", "torque")
-_MAX_BYTES, _MOST = 1_000_000, 500
+_MOST = 500
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
@@ -56,7 +56,7 @@ class Claims:
 def read_claims(path: Path | str) -> Claims:
     """Read a claims file, or the published claims under the name ``paper``; BadInput names claim and key."""
     path = files("backdrive_bayes.decisions").joinpath("paper_claims.toml") if str(path) == PAPER else Path(path)
-    table = _load(path)
+    table = read_toml(path, f"a claims file or '{PAPER}'")
     if table.get("schema") != SCHEMA:
         raise BadInput(f"{path}, key schema", f"'{SCHEMA}'", repr(table.get("schema"))[:60])
     letters = table.get("units", list(LETTERS))
@@ -219,17 +219,3 @@ def _number_key(where, entry, key, default):
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value <= 0:
         raise BadInput(f"{where}, key {key}", "a positive number", repr(value)[:60])
     return float(value)
-
-
-def _load(path) -> dict:
-    try:
-        if not path.is_file():
-            raise BadInput(path, f"a claims file or '{PAPER}'", "nothing there")
-        data = path.read_bytes()
-        if len(data) > _MAX_BYTES:
-            raise BadInput(path, "a claims file of at most 1 MB", f"{len(data) / 1e6:.0f} MB")
-        return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
-    except UnicodeDecodeError as error:
-        raise BadInput(path, "text in UTF-8", f"another encoding (byte {error.start})") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise BadInput(path, "valid TOML", str(error)) from error

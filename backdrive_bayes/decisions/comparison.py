@@ -13,8 +13,8 @@ from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.loops import SAME_AMPLITUDE, SAME_RATE, Loop, NotAvailable, same
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
+from backdrive_bayes.results import COMPARISON
 
-SCHEMA = "backdrive-bayes/comparison/1"
 ROPE = 0.05
 CLEAR = 0.95
 """Probability from which a difference, or its absence, is called so."""
@@ -45,7 +45,7 @@ def compare(evidences, claims: Claims | None = None, rope: float = ROPE, level: 
         reasons = "; ".join(dict.fromkeys(r["reason"] for p in pairs for r in p["refused"]))
         raise BadInput(" and ".join(names), "a rate and amplitude in common", reasons)
     return {
-        "schema": SCHEMA,
+        "schema": COMPARISON,
         "names": names,
         "level": level,
         "rope": rope,

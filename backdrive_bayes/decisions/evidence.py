@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +15,7 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import CORE, indicator_draws
 from backdrive_bayes.inference.fit import Posterior
 from backdrive_bayes.inference.posterior_file import attributes_of
-from backdrive_bayes.results import read_group
+from backdrive_bayes.results import DIAGNOSIS, INDICATORS, read_group, read_result
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +36,12 @@ class Evidence:
     def read(cls, folder: Path) -> Evidence:
         """From a result folder of a fit; BadInput where it is none or comes from a version that saved no draws."""
         folder = Path(folder)
-        about = _json(folder / "indicators.json", "backdrive-bayes/indicators/1")
+        about = read_result(folder / "indicators.json", INDICATORS)
         if not (folder / "posterior.nc").is_file():
             raise BadInput(folder, "a result folder with posterior.nc", "none")
         posterior = read_group(folder / "posterior.nc", "posterior")
         path = folder / "diagnosis.json"
-        diagnosis = _json(path, "backdrive-bayes/diagnosis/1") if path.is_file() else None
+        diagnosis = read_result(path, DIAGNOSIS) if path.is_file() else None
         shared = {str(n): v.values.ravel() for n, v in posterior.items() if v.dims == ("chain", "draw")}
         return cls(about, _indicator_group(folder / "posterior.nc"), shared, diagnosis, str(folder))
 
@@ -181,16 +180,3 @@ def _indicator_group(path: Path):
     except BadInput as error:
         found = "a posterior without them (fit the unit again with this version)"
         raise BadInput(path, "a posterior.nc that holds draws of the indicators", found) from error
-
-
-def _json(path: Path, schema: str) -> dict:
-    try:
-        loaded = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadInput(path, "a result file", "no such file") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BadInput(path, "a JSON result file", f"unreadable file ({type(error).__name__})") from None
-    found = loaded.get("schema") if isinstance(loaded, dict) else None
-    if found != schema:
-        raise BadInput(path, f"schema '{schema}'", repr(found))
-    return loaded

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 from backdrive_bayes.decisions.global_risk import SHAPES, Process
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
+from backdrive_bayes.records.toml_file import read_toml
 
-_MAX_BYTES = 1_000_000
 _KEYS = ("min", "max", "at", "k", "process")
 _AT = ("loading_rate_Nm_per_s", "amplitude_Nm")
 _PROCESS = ("mean", "sd", "shape")
@@ -48,7 +47,7 @@ class Limits:
 def read_limits(path: Path) -> Limits:
     """Read a limits file; BadInput names the key, what was expected and what was found."""
     path = Path(path)
-    table = _load(path)
+    table = read_toml(path, "a limits file")
     risk = _table(f"{path}, key risk", table.pop("risk", {}))
     _refuse_unknown(f"{path}, key risk", risk, _RISK)
     consumer = _risk(path, risk, "consumer", CONSUMER)
@@ -105,19 +104,6 @@ def _process(where, value) -> Process:
     if shape == "normal":
         return Process(_number(where, table, "mean", 0.0), _positive(where, table, "sd"), shape)
     return Process(_positive(where, table, "mean"), _positive(where, table, "sd"), shape)
-
-
-def _load(path: Path) -> dict:
-    try:
-        if not path.is_file():
-            raise BadInput(path, "a limits file", "a folder" if path.is_dir() else "nothing there")
-        if path.stat().st_size > _MAX_BYTES:
-            raise BadInput(path, "a limits file of at most 1 MB", f"{path.stat().st_size / 1e6:.0f} MB")
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n"))
-    except UnicodeDecodeError as error:
-        raise BadInput(path, "text in UTF-8", f"another encoding (byte {error.start})") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise BadInput(path, "valid TOML", str(error)) from error
 
 
 def _risk(path, table, key, default):

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import PNG_DPI, save_svg
 from backdrive_bayes.figures.style import BLUE, GREY, SERIES, Figure, new_figure, styled, words
-from backdrive_bayes.results import read_result
+from backdrive_bayes.results import BLIND, read_result
 
-SCHEMA = "backdrive-bayes/blind/1"
 CAPTIONS = {
     "confusion": "True effects (rows) and answers of the diagnosis (columns), in units; shade is the share of the row.",
     "power": "Listed single effects by severity: share in which a gap was seen, the right effect named and another named, "
@@ -30,7 +29,7 @@ def save_blind(folder: Path, out: Path) -> list[Path]:
     """Write the figures of ``folder``/blind.json into ``out`` as .svg and .png."""
     out.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, figure in blind_figures(read_result(Path(folder) / "blind.json", SCHEMA)).items():
+    for name, figure in blind_figures(read_result(Path(folder) / "blind.json", BLIND)).items():
         written.append(save_svg(figure, out / f"{name}.svg"))
         with styled():
             figure.savefig(out / f"{name}.png", format="png", dpi=PNG_DPI)

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.figures.style import record_labels
-from backdrive_bayes.results import read_result
+from backdrive_bayes.results import DIAGNOSIS, read_result
 
-DIAGNOSIS = "backdrive-bayes/diagnosis/1"
 FILE = "diagnosis.json"
 _SUFFIX = re.compile(r"\.(csv|parquet|tdms|mat)(\.[a-z0-9]+)?$", re.IGNORECASE)
 PLAIN = ("unknown", "none")

@@ -19,6 +19,7 @@ from backdrive_bayes.indicators.summary import interval, loading_rate_nm_per_s
 from backdrive_bayes.inference.discrepancy import amplitude_nm
 from backdrive_bayes.model.registry import BASELINE, candidates_beside
 from backdrive_bayes.records.record import Unit
+from backdrive_bayes.results import DIAGNOSIS
 
 LEVEL = 0.9
 
@@ -94,7 +95,7 @@ class _Found:
         none = self.candidates.none.fitted
         z_none, z_chosen = (draws.laplace_draws(f, whitening, self.rng) for f in (none, chosen.fitted))
         return {
-            "schema": "backdrive-bayes/diagnosis/1",
+            "schema": DIAGNOSIS,
             "unit": self.setting.unit.name,
             "baseline": list(baseline),
             "level": LEVEL,

@@ -16,6 +16,7 @@ from backdrive_bayes.indicators.loop import (
 from backdrive_bayes.inference.discrepancy import Discrepancy
 from backdrive_bayes.inference.fit import Posterior
 from backdrive_bayes.inference.problem import Problem
+from backdrive_bayes.results import INDICATORS
 
 LEVEL = 0.9
 POSITIONS = 10
@@ -73,7 +74,7 @@ def indicators_json(posterior: Posterior, k: float, level: float = LEVEL) -> dic
     """The contract's indicators object (least-squares comparison left to the caller)."""
     problem = posterior.problem
     return {
-        "schema": "backdrive-bayes/indicators/1",
+        "schema": INDICATORS,
         "unit": posterior.unit.name,
         "k": k,
         "level": level,

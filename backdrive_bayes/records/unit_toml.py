@@ -5,15 +5,14 @@ from __future__ import annotations
 import datetime
 import difflib
 import math
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.records.toml_file import read_toml
 
 SCHEMA = "backdrive-bayes/unit/1"
 FILE_NAME = "unit.toml"
-_MAX_BYTES = 1_000_000
 _UNIT_KEYS = ("schema", "name", "rated_torque_Nm", "reduction_ratio", "record")
 _RECORD_KEYS = ("file", "loading_rate_Nm_per_s", "amplitude_Nm", "columns")
 _COLUMN_KEYS = ("time", "torque", "angle")
@@ -45,7 +44,7 @@ class UnitEntry:
 def read_unit_toml(folder: Path) -> UnitEntry:
     """Read ``unit.toml`` in ``folder``; BadInput names the key, what was expected and what was found."""
     path = folder / FILE_NAME
-    table = _load(path)
+    table = read_toml(path, "a unit file", "a folder without one" if folder.is_dir() else "nothing there")
     schema = _text(path, table, "schema")
     if schema != SCHEMA:
         raise BadInput(f"{path}, key schema", f"'{SCHEMA}'", f"'{schema}'")
@@ -58,21 +57,6 @@ def read_unit_toml(folder: Path) -> UnitEntry:
         identity=identity,
         notes=notes,
     )
-
-
-def _load(path: Path) -> dict:
-    try:
-        if not path.is_file():
-            raise BadInput(
-                path, "a unit file", "a folder without one" if path.parent.is_dir() else "nothing there"
-            )
-        if path.stat().st_size > _MAX_BYTES:
-            raise BadInput(path, "a unit file of at most 1 MB", f"{path.stat().st_size / 1e6:.0f} MB")
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n"))
-    except UnicodeDecodeError as error:
-        raise BadInput(path, "text in UTF-8", f"another encoding (byte {error.start})") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise BadInput(path, "valid TOML", str(error)) from error
 
 
 def _records(path: Path, folder: Path, table: dict) -> tuple[RecordEntry, ...]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.figures.blind import CAPTIONS, SCHEMA, blind_figures
+from backdrive_bayes.figures.blind import CAPTIONS, blind_figures
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Picture, Table
 from backdrive_bayes.report.numbers import significant
-from backdrive_bayes.results import read_result
+from backdrive_bayes.results import BLIND, read_result
 
 TITLE = "Blind check"
 _VERDICT = {True: "met", False: "missed", None: "not scored"}
@@ -15,7 +15,7 @@ _VERDICT = {True: "met", False: "missed", None: "not scored"}
 
 def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``blind`` and lay out its pages."""
-    result = read_result(Path(folder) / "blind.json", SCHEMA)
+    result = read_result(Path(folder) / "blind.json", BLIND)
     figures = blind_figures(result)
     return Chapter(
         TITLE,
