@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from backdrive_bayes.gap import draws, next_test, where
 from backdrive_bayes.gap.candidates import REFERENCE, Candidates, Weighed, weigh_all
 from backdrive_bayes.gap.fast import Fast, weigh_fast
-from backdrive_bayes.gap.probabilities import credible_set, marginal, probabilities
+from backdrive_bayes.gap.probabilities import Evidences, credible_set, marginal, probabilities
 from backdrive_bayes.gap.setting import Setting
 from backdrive_bayes.gap.shrink import closed_fraction, shrink
 from backdrive_bayes.indicators.summary import interval, loading_rate_nm_per_s
@@ -57,7 +57,7 @@ def _diagnose(unit, baseline, seed, allowed, k, progress):
     candidates = weigh_all(setting, rng, progress, allowed)
     progress("looking for jumps, vibration and encoder error")
     fast = _allowed_fast(weigh_fast(setting, candidates.best.fitted), allowed)
-    joint = probabilities(candidates, fast)
+    joint = probabilities(Evidences.of(candidates, fast))
     labels = marginal(joint)
     effects = max(joint, key=joint.get)
     progress("where, and how far it shrinks")

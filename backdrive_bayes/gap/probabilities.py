@@ -36,9 +36,35 @@ CALIBRATION = Calibration()
 NONE, UNKNOWN = (), ("unknown",)
 
 
-def probabilities(candidates: Candidates, fast: Fast, calibration: Calibration = CALIBRATION) -> dict[tuple[str, ...], float]:
+@dataclass(frozen=True, eq=False)
+class Evidences:
+    """Log evidences of one unit: ``slow`` by effects (misfit levels,), ``unexplained`` (2, kinds, levels), ``fast`` by name."""
+
+    slow: dict[tuple[str, ...], np.ndarray]
+    unexplained: np.ndarray
+    fast: dict[str, float]
+
+    @classmethod
+    def of(cls, candidates: Candidates, fast: Fast) -> Evidences:
+        """From fitted hypotheses and fast structure."""
+        slow = {tuple(sorted(w.effects)): w.log_evidence for w in candidates.weighed}
+        return cls(slow, candidates.unexplained, dict(fast.log_evidence))
+
+    def as_json(self) -> dict:
+        """Plain JSON data."""
+        slow = [[list(k), v.tolist()] for k, v in self.slow.items()]
+        return {"slow": slow, "unexplained": self.unexplained.tolist(), "fast": self.fast}
+
+    @classmethod
+    def from_json(cls, kept: dict) -> Evidences:
+        """What :meth:`as_json` gave."""
+        slow = {tuple(names): np.array(values) for names, values in kept["slow"]}
+        return cls(slow, np.array(kept["unexplained"]), kept["fast"])
+
+
+def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects, () for none and ("unknown",) for something not in the library; they sum to one."""
-    slow, quick = _slow(candidates, calibration), _fast(fast, calibration)
+    slow, quick = _slow(evidences, calibration), _fast(evidences.fast, calibration)
     joint: dict[tuple[str, ...], float] = {}
     for effects, p in slow.items():
         for name, q in quick.items():
@@ -53,27 +79,25 @@ def _union(effects, fast):
     return effects if fast is None or fast in effects else tuple(sorted((*effects, fast)))
 
 
-def _slow(candidates, c):
+def _slow(evidences, c):
     misfit = np.log(c.misfit)
-    singles = [w for w in candidates.weighed if len(w.effects) == 1]
-    possible = len(singles) * (len(singles) - 1) / 2
-    share = {0: c.none, 1: c.single / max(len(singles), 1), 2: c.pair / max(possible, 1)}
+    singles = sum(len(effects) == 1 for effects in evidences.slow)
+    share = {0: c.none, 1: c.single / max(singles, 1), 2: c.pair / max(singles * (singles - 1) / 2, 1)}
     score = {
-        tuple(sorted(w.effects)): np.log(share[len(w.effects)]) + logsumexp(w.log_evidence + misfit) / c.temperature
-        for w in candidates.weighed
+        effects: np.log(share[len(effects)]) + logsumexp(values + misfit) / c.temperature
+        for effects, values in evidences.slow.items()
     }
-    kinds = candidates.unexplained.shape[1]
     with np.errstate(divide="ignore"):
         levels = np.log([c.unknown_level, c.beside_level])[:, None, :]
-    total = logsumexp(candidates.unexplained + levels) - np.log(kinds)
+    total = logsumexp(evidences.unexplained + levels) - np.log(evidences.unexplained.shape[1])
     score[UNKNOWN] = np.log(c.unknown) + total / c.temperature
     return _normalised(score)
 
 
 def _fast(fast, c):
     score = {None: np.log(1 - c.fast)}
-    for name, value in fast.log_evidence.items():
-        score[name] = np.log(c.fast / len(fast.log_evidence)) + min(value, 1e4) / c.fast_temperature
+    for name, value in fast.items():
+        score[name] = np.log(c.fast / len(fast)) + min(value, 1e4) / c.fast_temperature
     return _normalised(score)
 
 

@@ -2,7 +2,8 @@
 
 Reality is the model plus a smooth function of the position on the loop. The function is a random Fourier series on the
 closed loop (its coordinate grows evenly with torque, with angle and with the logarithm of torque, so that cliffs and the
-neighbourhood of zero torque get their share), plus a series of its own on the first leg. Taking out the parameters' directions
+neighbourhood of zero torque get their share), plus cusps at its tips, where friction turns over within a few per cent of the
+torque, plus a series of its own on the first leg. Taking out the parameters' directions
 keeps their meaning (Plumlee 2017, doi:10.1080/01621459.2016.1211016); scale and length maximise the evidence of the
 residual.
 """
@@ -20,6 +21,12 @@ from backdrive_bayes.model.path import TorquePath
 
 HARMONICS = 72
 FIRST_LEG_TERMS = 16
+CUSPS = np.array([0.01, 0.03, 0.1])
+"""Widths, in loops, of the cusps that the discrepancy may have at either tip."""
+CUSP_SHARE = 0.3
+"""Prior standard deviation of a cusp, relative to that of the smooth part."""
+WIDTH = 2 * HARMONICS + 2 * CUSPS.size + FIRST_LEG_TERMS
+"""Terms of one record."""
 LENGTHS = np.array([0.01, 0.03, 0.1, 0.3])
 ROUGHNESS = (1.0, 2.0)
 """Spectral exponents: Matérn-1/2, which may have kinks, and Matérn-3/2, which is smooth."""
@@ -126,9 +133,8 @@ class Discrepancy:
         ``model`` (default: the problem's own) is the part of the model whose angle the basis belongs to.
         """
         raw = _basis(self.coordinates[record], path, first_leg)
-        width = raw.shape[1]
         full = np.zeros((raw.shape[0], self.factor.shape[0]))
-        full[:, record * width : (record + 1) * width] = raw
+        full[:, record * WIDTH : (record + 1) * WIDTH] = raw
         return full - angle_jacobian(problem, self.optimum.z, record, path, model) @ self.absorbed
 
 
@@ -175,7 +181,7 @@ def _loop_time_s(data):
 
 
 def _basis(coordinate, path, first_leg):
-    """Fourier terms on the loop, and cosine terms on the first leg, shape (samples, terms)."""
+    """Fourier terms on the loop, cusps at its tips, and cosine terms on the first leg, shape (samples, terms)."""
     phase = coordinate.phase(path.torque_nm, path.direction)
     angle = 2 * np.pi * np.arange(1, HARMONICS + 1) * phase[:, None]
     first = np.zeros((phase.size, FIRST_LEG_TERMS))
@@ -183,23 +189,27 @@ def _basis(coordinate, path, first_leg):
         stop = path.legs[0].stop
         along = 2 * np.abs(phase[:stop] - phase[0])
         first[:stop] = np.cos(np.pi * np.arange(FIRST_LEG_TERMS) * along[:, None])
-    return np.concatenate([np.cos(angle), np.sin(angle), first], axis=1)
+    apart = np.abs(phase[:, None] - np.array([0.0, 0.5]))
+    apart = np.minimum(apart, 1 - apart)
+    cusps = np.exp(-apart[:, :, None] / CUSPS).reshape(phase.size, -1)
+    return np.concatenate([np.cos(angle), np.sin(angle), cusps, first], axis=1)
 
 
 def prior_deviation(length: float, roughness: float) -> np.ndarray:
     """Prior standard deviation of one record's coefficients for unit scale, shape (terms,), of a Matérn spectrum."""
     loop = (1 + (2 * np.pi * np.arange(1, HARMONICS + 1) * length) ** 2) ** -roughness
     first = (1 + (np.pi * np.arange(FIRST_LEG_TERMS) * length) ** 2) ** -roughness
-    return np.sqrt(np.concatenate([loop / loop.sum(), loop / loop.sum(), first / first.sum()]))
+    cusps = np.full(2 * CUSPS.size, CUSP_SHARE**2)
+    return np.sqrt(np.concatenate([loop / loop.sum(), loop / loop.sum(), cusps, first / first.sum()]))
 
 
 def _whitened_basis(problem, coordinates):
-    blocks, width = [d.blocks.angle_rad.size for d in problem.records], 2 * HARMONICS + FIRST_LEG_TERMS
-    basis = np.zeros((sum(blocks), width * len(blocks)))
+    blocks = [d.blocks.angle_rad.size for d in problem.records]
+    basis = np.zeros((sum(blocks), WIDTH * len(blocks)))
     row = 0
     for r, (data, coordinate) in enumerate(zip(problem.records, coordinates, strict=True)):
         raw = _basis(coordinate, data.path, first_leg=True)
-        basis[row : row + blocks[r], r * width : (r + 1) * width] = data.whitener @ raw
+        basis[row : row + blocks[r], r * WIDTH : (r + 1) * WIDTH] = data.whitener @ raw
         row += blocks[r]
     return basis
 
@@ -209,10 +219,10 @@ def _most_evident(problem, basis, residual, relative, span, lengths):
 
     For the choice alone, the small couplings between records that orthogonality brings are left out.
     """
-    width, row, parts = 2 * HARMONICS + FIRST_LEG_TERMS, 0, []
+    row, parts = 0, []
     for r, data in enumerate(problem.records):
         n = data.blocks.angle_rad.size
-        own = basis[row : row + n, r * width : (r + 1) * width]
+        own = basis[row : row + n, r * WIDTH : (r + 1) * WIDTH]
         parts.append((own.T @ own, own.T @ residual[row : row + n]))
         row += n
     scale2 = (span * RELATIVE_SCALES[:, None]) ** 2

@@ -50,12 +50,20 @@ def test_an_effect_grows_with_its_strength(name):
 
 
 def test_slip_moves_above_its_threshold_while_loading_only():
-    reducer, effect = drawn("interface_slip")
-    torque, _, off = change("interface_slip", 0.1)
+    _, effect = drawn("interface_slip")
+    torque, _, off = change("interface_slip", 0.1, make=lambda effect: replace(effect, springs_back=False))
     moved = np.abs(np.diff(off)) > 1e-9
     loading = np.diff(np.abs(torque)) > 0
     assert moved.any() and not (moved & ~loading).any()
     assert np.abs(torque[:-1][moved]).min() > effect.threshold - effect.patches_spread - 0.02
+
+
+def test_slip_that_springs_back_begins_when_the_load_has_fallen_by_twice_its_threshold():
+    _, effect = drawn("interface_slip")
+    torque, _, off = change("interface_slip", 0.1, make=lambda effect: replace(effect, springs_back=True))
+    falling = (np.diff(torque) < 0) & (np.arange(torque.size - 1) > np.argmax(torque))
+    begun = torque[:-1][falling & (np.diff(off) < -1e-9)]
+    assert abs(begun.max() - (1 - 2 * effect.threshold)) < 2 * effect.patches_spread + 0.03
 
 
 def test_creep_goes_on_longer_in_a_slower_record():

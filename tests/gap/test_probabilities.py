@@ -1,5 +1,6 @@
 """From evidences to probabilities and credible sets."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from backdrive_bayes.gap.candidates import MISFIT_LEVELS, UNKNOWN_KINDS, UNKNOWN_LEVELS
 from backdrive_bayes.gap.fast import Fast
-from backdrive_bayes.gap.probabilities import CALIBRATION, credible_set, marginal, probabilities
+from backdrive_bayes.gap.probabilities import CALIBRATION, Evidences, credible_set, marginal, probabilities
 
 QUIET = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": -3.0}, {})
 LEVELS = -np.arange(len(MISFIT_LEVELS), dtype=float)
@@ -22,7 +23,7 @@ def candidates(unexplained=-50.0, **gains):
 
 
 def labels(found, fast=QUIET):
-    return marginal(probabilities(found, fast))
+    return marginal(probabilities(Evidences.of(found, fast)))
 
 
 def test_probabilities_sum_to_one_and_are_sorted():
@@ -68,3 +69,9 @@ def test_priors_are_a_distribution():
     assert c.none + c.single + c.pair + c.unknown == pytest.approx(1.0)
     assert len(c.misfit) == len(c.misfit) == len(MISFIT_LEVELS)
     assert sum(c.misfit) == pytest.approx(1.0) and sum(c.unknown_level) == pytest.approx(1.0)
+
+
+def test_evidences_survive_json():
+    kept = Evidences.of(candidates(sensor_lag=3.0, sensor_lag__thermal_drift=4.0), QUIET)
+    again = Evidences.from_json(json.loads(json.dumps(kept.as_json())))
+    assert probabilities(again) == probabilities(kept)

@@ -16,28 +16,39 @@ LAWS = ("linear", "accelerating", "saturating")
 class InterfaceSlip(Effect):
     """Contact patches let go one after another from ``threshold`` on (share of rated torque); strength is angle share.
 
-    Source: partial slip of clamped joints, Johnson, Contact Mechanics, 1985, section 7.2.
+    ``springs_back`` tells patches that the clamp's own elasticity pushes back, so that they slip again as soon as the load has
+    fallen by twice their threshold, from patches that rest where they are. Source: partial slip of clamped joints, Johnson,
+    Contact Mechanics, 1985, section 7.2.
     """
 
     threshold: float
     patches_spread: float
     law: str
+    springs_back: bool
 
     of_reducer = False
 
     def deflect(self, run, torque_nm, transmitted_nm, angle_rad):
         """Slip [rad]."""
         patches = self.threshold + self.patches_spread * np.linspace(-1, 1, 9)
+        load = torque_nm / run.reducer.rated_torque_nm
 
-        def advance(size_nm):
-            over = np.maximum(size_nm[:, None] / run.reducer.rated_torque_nm - patches, 0.0).mean(axis=1)
+        def advance(over):
             if self.law == "accelerating":
-                return over + 4.0 * over**2
-            return 0.15 * np.log1p(over / 0.15) if self.law == "saturating" else over
+                return over + 4.0 * over * np.abs(over)
+            return 0.15 * np.sign(over) * np.log1p(np.abs(over) / 0.15) if self.law == "saturating" else over
 
-        return self.strength * run.reducer.angle_rad * elements.slip_while_loading(torque_nm, advance)
+        if self.springs_back:
+            drive = load[:, None]
+            slip = elements.drag_between(advance(drive - patches), advance(drive + patches), np.zeros(patches.size)).mean(axis=1)
+        else:
+            slip = elements.slip_while_loading(
+                load, lambda size: np.mean([advance(np.maximum(size - patch, 0.0)) for patch in patches], axis=0)
+            )
+        return self.strength * run.reducer.angle_rad * slip
 
 
 def draw(rng, reducer):
     """Thresholds from half to nine tenths of the rated torque."""
-    return InterfaceSlip(0.0, rng.uniform(0.5, 0.85), rng.uniform(0.01, 0.06), str(rng.choice(LAWS)))
+    law, back = str(rng.choice(LAWS)), bool(rng.integers(2))
+    return InterfaceSlip(0.0, rng.uniform(0.5, 0.85), rng.uniform(0.01, 0.06), law, back)

@@ -14,7 +14,7 @@ POLYMER = "weakly informative: delayed compliance of some per cent of the elasti
 
 
 class ViscoelasticCreep:
-    """Two Kelvin-Voigt elements in series, relaxing with T and 6T towards the load's part above a creep threshold.
+    """Two Kelvin-Voigt elements in series, relaxing with T and 6T towards the load and at rest within a threshold of it.
 
     They begin ``initial_creep`` rated torques away from rest.
     """
@@ -34,9 +34,26 @@ class ViscoelasticCreep:
 
     def respond(self, values, drive):
         """Angle [rad], shape (…, samples)."""
-        load = drive.transmitted_nm
-        load = load - np.clip(load, -values["creep_threshold"], values["creep_threshold"])
-        time, constant, slow = drive.path.time_s, values["creep_time"], values["creep_slow_share"]
-        start = load[..., :1] + values["initial_creep"] * drive.rated_torque_nm
-        fast = relax(load, time, constant, start)
-        return values["creep_compliance"] * (fast + slow * (relax(load, time, SLOWER * constant, start) - fast))
+        threshold, constant, slow = values["creep_threshold"], values["creep_time"], values["creep_slow_share"]
+        start = drive.transmitted_nm[..., :1]
+        start = start - np.clip(start, -threshold, threshold) + values["initial_creep"] * drive.rated_torque_nm
+        fast = _creep(drive, threshold, constant, start)
+        return values["creep_compliance"] * (fast + slow * (_creep(drive, threshold, SLOWER * constant, start) - fast))
+
+
+def _creep(drive, threshold, constant, start):
+    """State (…, samples) of an element that relaxes towards the load less a threshold and rests within it.
+
+    Over a leg the element first follows the former direction until the load meets it, then rests, then follows the new one.
+    """
+    load, time, state, pieces = drive.transmitted_nm, drive.path.time_s, start, []
+    for leg in drive.path.legs:
+        # The last sample of the leg before is where relaxation goes on from.
+        own = slice(max(leg.start - 1, 0), leg.stop)
+        ahead, elapsed = leg.direction * load[..., own], time[own]
+        ending = -np.maximum.accumulate(relax(-ahead - threshold, elapsed, constant, -leg.direction * state), axis=-1)
+        rest = ending[..., -1:]
+        moved = ending + relax(np.maximum(ahead - threshold, rest), elapsed, constant, rest) - rest
+        pieces.append(leg.direction * moved[..., leg.start - own.start :])
+        state = pieces[-1][..., -1:]
+    return np.concatenate(pieces, axis=-1)

@@ -1,0 +1,171 @@
+"""Temperatures and priors of the diagnosis, set on units of the virtual bench.
+
+    python studies/diagnosis_calibration.py weigh --units 160 --out reports/diagnosis-calibration
+    python studies/diagnosis_calibration.py set --out reports/diagnosis-calibration
+
+``weigh`` draws units as a blind check does and keeps the log evidences of every hypothesis (evidences.jsonl, one line a unit;
+units that are there already are left alone). ``set`` finds the calibration of highest mean log score over those units, and tells
+by ten-fold cross-validation what it is worth on units that it has not seen (calibration.json).
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import json
+import time
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from backdrive_bayes.bench.unit import draw_unit
+from backdrive_bayes.blind.calibration import calibration
+from backdrive_bayes.blind.key import label_of
+from backdrive_bayes.blind.request import Request, assign, draw_plan
+from backdrive_bayes.gap.candidates import weigh_all
+from backdrive_bayes.gap.fast import weigh_fast
+from backdrive_bayes.gap.probabilities import CALIBRATION, Evidences, credible_set, marginal, probabilities
+from backdrive_bayes.gap.setting import Setting
+from backdrive_bayes.model.registry import BASELINE
+
+SEED = 77
+SEVERITIES = (1.0, 0.4, 0.2, 0.1)
+
+
+def weigh(job) -> dict:
+    """Evidences of one unit, with its truth."""
+    warnings.simplefilter("ignore")
+    index, effects = job
+    rng = np.random.default_rng([SEED, index])
+    bench = draw_unit(rng, effects, plan=draw_plan(Request(1), rng))
+    began, rng = time.perf_counter(), np.random.default_rng(0)
+    setting = Setting.of(bench.unit, rng, BASELINE)
+    candidates = weigh_all(setting, rng)
+    fast = weigh_fast(setting, candidates.best.fitted)
+    planted = [
+        {"name": p.name, "severity": p.severity, "height": round(p.height, 2), "limited": bool(p.limited)}
+        for p in bench.truth.planted
+    ]
+    return {
+        "index": index, "truth": label_of(bench.truth.answer), "severity": min(effects.values(), default=None),
+        "planted": planted, "evidences": Evidences.of(candidates, fast).as_json(), "seconds": time.perf_counter() - began,
+    }  # fmt: skip
+
+
+def told(result, chosen=CALIBRATION) -> dict[str, float]:
+    """Probabilities by label under a calibration."""
+    labels = marginal(probabilities(Evidences.from_json(result["evidences"]), chosen))
+    return {label_of(name.split("+")) if name != "none" else name: p for name, p in labels.items()}
+
+
+def run(options):
+    """Weigh the units that are not there yet."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    path = options.out / "evidences.jsonl"
+    done = {json.loads(line)["index"] for line in path.read_text().splitlines()} if path.exists() else set()
+    effects = assign(Request(options.units, SEVERITIES, seed=SEED), np.random.default_rng([SEED, 0]))
+    jobs = [(i, e) for i, e in enumerate(effects) if i not in done]
+    with ProcessPoolExecutor(options.workers) as pool, path.open("a") as file:
+        for result in pool.map(weigh, jobs):
+            file.write(json.dumps(result) + "\n")
+            file.flush()
+            show(result)
+
+
+def show(result):
+    """One line a unit."""
+    labels = told(result)
+    top = list(labels.items())[:3]
+    names = [f"{p['name']} {p['severity']} ({p['height']:.1f})" for p in result["planted"]]
+    verdict = "ok " if top[0][0] == result["truth"] else "BAD"
+    said = [f"{k} {v:.2f}" for k, v in top]
+    print(result["index"], verdict, result["truth"], names, said, f"{result['seconds']:.0f} s", flush=True)
+
+
+FREE = ("temperature", "fast_temperature", "none", "single", "pair", "unknown", "fast", "misfit_slope", "beside")
+
+
+def with_values(values):
+    """A calibration from free logarithms: temperatures above one, prior weights that sum to one."""
+    t, ft, none, single, pair, unknown, fast, slope, beside = values
+    prior = np.exp([none, single, pair, unknown])
+    prior /= prior.sum()
+    misfit = np.exp(-np.exp(slope) * np.arange(len(CALIBRATION.misfit)))
+    return replace(
+        CALIBRATION, temperature=1 + np.exp(t), fast_temperature=1 + np.exp(ft), none=prior[0], single=prior[1], pair=prior[2],
+        unknown=prior[3], fast=1 / (1 + np.exp(-fast)), misfit=tuple(misfit / misfit.sum()),
+        beside_level=tuple(np.array(CALIBRATION.beside_level) / sum(CALIBRATION.beside_level) / (1 + np.exp(-beside))),
+    )  # fmt: skip
+
+
+START = np.array([np.log(3.0), np.log(3.0), np.log(0.3), np.log(0.4), np.log(0.08), np.log(0.22), -1.7, -0.4, -0.8])
+
+
+def find(results) -> np.ndarray:
+    """Free values of the highest mean log score, held near the start by a weak prior."""
+
+    def loss(values):
+        chosen = with_values(values)
+        given = [told(r, chosen).get(r["truth"], 0.0) for r in results]
+        return -np.mean(np.log(np.maximum(given, 1e-4))) + 0.5 * np.sum((values - START) ** 2) / len(results)
+
+    return minimize(loss, START, method="Powell", options={"maxfev": 900, "xtol": 0.02, "ftol": 1e-4}).x
+
+
+def score(results, forecasts) -> dict:
+    """Hit rates by severity, set coverage and size, false alarms, calibration."""
+    table = {}
+    for severity in (None, *SEVERITIES):
+        own = [(r, f) for r, f in zip(results, forecasts, strict=True) if r["severity"] == severity]
+        table["none" if severity is None else f"{severity:g}"] = {
+            "units": len(own), "right": sum(max(f, key=f.get) == r["truth"] for r, f in own),
+        }  # fmt: skip
+    sets = [credible_set(f) for f in forecasts]
+    truths = [r["truth"] for r in results]
+    found = calibration(forecasts, truths)
+    top = found["top"]
+    return {
+        "right": table, "set_coverage": float(np.mean([t in s for t, s in zip(truths, sets, strict=True)])),
+        "set_size": float(np.mean([len(s) for s in sets])), "calibration_error": top["expected_error"],
+        "mean_probability": top["mean_probability"], "hit_rate": top["hit_rate"], "log_score": found["log_score"]["mean"],
+    }  # fmt: skip
+
+
+def settle(options):
+    """Find the calibration and write what it is worth."""
+    results = [json.loads(line) for line in (options.out / "evidences.jsonl").read_text().splitlines()]
+    fold = np.random.default_rng(0).permutation(len(results)) % 10
+    unseen = [None] * len(results)
+    for k in range(10):
+        chosen = with_values(find([r for r, f in zip(results, fold, strict=True) if f != k]))
+        for i in np.flatnonzero(fold == k):
+            unseen[i] = told(results[i], chosen)
+    best = with_values(find(results))
+    summary = {
+        "units": len(results), "calibration": asdict(best), "cross_validated": score(results, unseen),
+        "as_set_now": score(results, [told(r) for r in results]), "seen": score(results, [told(r, best) for r in results]),
+    }  # fmt: skip
+    (options.out / "calibration.json").write_text(json.dumps(summary, indent=1, default=float))
+    print(json.dumps(summary, indent=1, default=float))
+
+
+def main():
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("step", choices=("weigh", "set"))
+    parser.add_argument("--units", type=int, default=160)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("reports/diagnosis-calibration"))
+    options = parser.parse_args()
+    {"weigh": run, "set": settle}[options.step](options)
+
+
+if __name__ == "__main__":
+    main()
