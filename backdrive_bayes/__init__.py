@@ -9,7 +9,7 @@
 The names are loaded when they are first used, so that importing the package costs nothing.
 """
 
-_LAZY = ("Unit", "Fit", "Verdict", "Comparison", "fit", "accept", "compare", "report", "BadInput")
+_LAZY = ("Unit", "Fit", "Diagnosis", "Verdict", "Comparison", "fit", "diagnose", "accept", "compare", "report", "BadInput")
 __all__ = list(_LAZY)
 
 

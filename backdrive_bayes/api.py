@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import html
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
 from backdrive_bayes.commands.output import probability_text, write_folder, write_json
-from backdrive_bayes.commands.results import FitOptions, draw_figures, fit_unit, is_result, keep_fit
+from backdrive_bayes.commands.results import FitOptions, diagnose_unit, draw_figures, fit_unit, is_result, keep_fit
 from backdrive_bayes.decisions.acceptance import assess
 from backdrive_bayes.decisions.claims import read_claims
 from backdrive_bayes.decisions.comparison import ROPE
@@ -61,6 +61,37 @@ class Fit:
         rows = [[r["file"], *(_interval(r["indicators"][n]) for n in names)] for r in self.indicators["records"]]
         state = "converged" if self.converged else "NOT converged"
         return _title(self.indicators["unit"], state) + _table(["record", *names], rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """A diagnosis object, of diagnosis.json's form, and the fit of the model that it chose."""
+
+    result: dict
+    fit: Fit
+
+    @property
+    def effects(self) -> list[str]:
+        """The answer: names of effects, none for no gap, ["unknown"] for one that the library does not hold."""
+        return self.result["answer"]["effects"]
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Probability of every candidate, highest first."""
+        return {row["effect"]: row["probability"] for row in self.result["which"]}
+
+    def save(self, folder: Path | str, figures: bool = True) -> Path:
+        """Write diagnosis.json, the chosen model's fit and figures, as the verb ``diagnose`` does."""
+        with write_folder(folder) as room:
+            write_json(room / "diagnosis.json", self.result)
+            keep_fit(self.fit.posterior, self.fit.indicators, room, figures)
+        return Path(folder)
+
+    def _repr_html_(self):
+        rows = [[name, probability_text(p)] for name, p in self.probabilities.items() if p >= 0.005]
+        where = html.escape(self.result["where"]["summary"])
+        named = " + ".join(self.effects) or "no gap"
+        return _title(self.result["unit"], named) + _table(["effect", "probability"], rows) + f"<p>{where}</p>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +161,15 @@ def fit(unit, *, k: float = 0.03, level: float = 0.9, seed: int = 0, budget: flo
     return Fit(*fit_unit(unit, FitOptions(k=k, level=level, seconds=budget, seed=seed, **given), progress or (lambda text: None)))
 
 
+def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, budget: float = 30.0, baseline=None, progress=None) -> Diagnosis:
+    """Where model and measurement part, which effect causes it, and the fit of the model with it, as for :func:`fit`."""
+    given = {} if baseline is None else {"baseline": tuple(baseline)}
+    unit = unit if isinstance(unit, record.Unit) else Unit.read(unit)
+    options = FitOptions(k=k, level=level, seconds=budget, seed=seed, **given)
+    result, sampled = diagnose_unit(unit, options, progress or (lambda text: None))
+    return Diagnosis(result, Fit(*sampled))
+
+
 def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
     """The verdict on a fitted unit against limits (a file or :class:`Limits`).
 
@@ -162,6 +202,8 @@ def report(*results, out: Path | str) -> Path:
 def _evidence(fitted) -> Evidence:
     if isinstance(fitted, Fit):
         return fitted.evidence
+    if isinstance(fitted, Diagnosis):
+        return replace(fitted.fit.evidence, diagnosis=fitted.result)
     if isinstance(fitted, Evidence):
         return fitted
     return Evidence.read(Path(fitted)) if is_result(Path(fitted)) else fit(fitted).evidence

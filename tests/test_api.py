@@ -6,6 +6,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.decided import evidence, write_evidence
 
@@ -25,6 +26,22 @@ def test_results_show_themselves_and_escape_what_others_wrote(tmp_path):
     assert "&lt;script&gt;" in shown and "<script>" not in shown and "at most 1" in shown and "above 0.999" in shown
     comparison = backdrive_bayes.compare(evidence("a"), evidence("<b>"), claims="paper")
     assert len(comparison.claims) == 33 and "&lt;b&gt;" in comparison._repr_html_()
+
+
+def test_a_diagnosis_shows_its_answer_and_is_evidence_of_its_model(tmp_path):
+    from backdrive_bayes.bench.plan import make_plan
+    from backdrive_bayes.bench.unit import draw_unit
+
+    plan = make_plan(rates=(0.4, 2.0), amplitudes=(1.0,), cycles=1, sampling_hz=200.0)
+    unit = draw_unit(np.random.default_rng(5), {"sensor_lag": 4.0}, plan=plan, name="<lag>").unit
+    found = backdrive_bayes.diagnose(unit, budget=1.0)
+    assert found.effects == ["sensor_lag"] and found.probabilities["sensor_lag"] > 0.5
+    assert sum(found.probabilities.values()) == pytest.approx(1)
+    assert "sensor_lag" in found._repr_html_() and "&lt;lag&gt;" in found._repr_html_()
+    verdict = backdrive_bayes.accept(found, Limits((Limit("peak_angle_rad", hi=1.0),)))
+    assert verdict.result["structure"]
+    saved = found.save(tmp_path / "out", figures=False)
+    assert (saved / "diagnosis.json").is_file() and (saved / "posterior.nc").is_file()
 
 
 def test_saved_fits_are_as_good_as_fresh_ones(tmp_path):
@@ -51,7 +68,6 @@ def test_unknown_names_are_attribute_errors():
 @pytest.fixture(scope="module")
 def units(tmp_path_factory):
     """Two small units of one short record each."""
-    import numpy as np
     from conftest import answer
 
     folders = []

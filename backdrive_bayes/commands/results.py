@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from backdrive_bayes.commands.output import say, write_json
@@ -77,6 +77,19 @@ def fit_unit(unit, options: FitOptions, note=lambda text: None, resume=None):
     result["identity"] = dict(unit.identity)
     result["notes"] = [*unit.notes, *(f"{r.name}: {note}" for r in unit.records for note in r.notes)]
     return posterior, result
+
+
+def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: bool = True):
+    """The diagnosis object of a unit, and posterior and indicators object of the model it chose (None where not asked for)."""
+    from backdrive_bayes.gap.diagnose import diagnose
+
+    found = diagnose(unit, baseline=options.baseline, seed=options.seed, k=options.k, progress=note)
+    if not sample:
+        return found.json, None
+    named = tuple(e for e in found.effects if e not in options.baseline)
+    sampled = fit_unit(unit, replace(options, baseline=(*options.baseline, *named)), note)
+    found.json["convergence"] = sampled[0].convergence.to_json()
+    return found.json, sampled
 
 
 def keep_fit(posterior, result: dict, folder: Path, figures: bool = True) -> None:

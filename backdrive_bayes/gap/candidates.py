@@ -18,7 +18,7 @@ from backdrive_bayes.model.registry import candidates_beside
 
 REFERENCE = ("misfit", MISFIT_LENGTH, 0.5)
 """Misfit under which modes are searched."""
-MISFIT_LEVELS = (0.1, 0.3, 1.0, 2.0, 4.0, 10.0)
+MISFIT_LEVELS = (0.1, 0.3, 1.0, 3.0, 10.0)
 """Standard deviations of the misfit along the loop, in those of the noise, under which hypotheses are weighed."""
 UNKNOWN_KINDS = (("loop", 0.02), ("own_loop", 0.06), ("time_smooth", 0.1), ("time_rough", 0.05))
 UNKNOWN_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)

@@ -8,21 +8,30 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
+from scipy.special import logsumexp
 
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
 
-FORMULA_ERROR = 0.2
-"""Standard deviation by which an effect's contribution may differ from its formula, relative to the contribution."""
+FORMULA_ERRORS = (0.03, 0.2)
+"""Standard deviations by which an effect's contribution may differ from its formula, relative to the contribution."""
 FORMULA_LENGTH = 0.06
 
 
 def log_evidence(setting: Setting, fitted: Fitted, *terms) -> float:
     """Gaussian integral over the parameters of the model made linear at its mode, offsets under a flat prior.
 
-    ``terms`` are (kernel name, length, standard deviation in noise units) each, beside noise and formula error.
+    ``terms`` are (kernel name, length, standard deviation in noise units) each, beside noise and formula error, of which all
+    levels count alike.
     """
-    covariance = setting.covariance(*terms) + formula_error(setting, fitted)
+    base = setting.covariance(*terms)
+    if not fitted.effects:
+        return _gaussian(setting, fitted, base)
+    shape = formula_error(setting, fitted)
+    return float(logsumexp([_gaussian(setting, fitted, base + level**2 * shape) for level in FORMULA_ERRORS], b=1 / 2))
+
+
+def _gaussian(setting, fitted, covariance):
     lower = cholesky(covariance, lower=True, check_finite=False, overwrite_a=True)
     record = setting.places.record
     ones = (record[:, None] == np.arange(record.max() + 1)).astype(float)
@@ -35,12 +44,9 @@ def log_evidence(setting: Setting, fitted: Fitted, *terms) -> float:
     return float(log_norm + _integrated(fitted, white[:, 0], white[:, 1:]))
 
 
-def formula_error(setting: Setting, fitted: Fitted) -> np.ndarray | float:
-    """Covariance (blocks, blocks) of the error of the effects' formulas, zero for the baseline alone."""
-    total = 0.0
-    for change in fitted.contributions:
-        total = total + FORMULA_ERROR**2 * np.outer(change, change) * setting.kernel("shape", FORMULA_LENGTH)
-    return total
+def formula_error(setting: Setting, fitted: Fitted) -> np.ndarray:
+    """Covariance (blocks, blocks) of the error of the effects' formulas, relative to their contributions."""
+    return sum(np.outer(change, change) for change in fitted.contributions) * setting.kernel("shape", FORMULA_LENGTH)
 
 
 def _integrated(fitted, residual, jacobian):

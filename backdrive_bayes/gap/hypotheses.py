@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backdrive_bayes.gap.setting import JointProblem, Setting, Whitening
-from backdrive_bayes.inference.optimum import find_optimum
-from backdrive_bayes.inference.starts import FEATURE_STARTS, feature_starts
+from backdrive_bayes.inference.optimum import best_mode
+from backdrive_bayes.inference.starts import FEATURE_STARTS, feature_starts, scattered
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import BASELINE, members_named
 
 SCREENED = 256
-STARTS = 2
+STARTS = 3
 PROBE = 1e-4
 
 
@@ -39,10 +39,9 @@ def joint_problem(setting: Setting, effects, whitening: Whitening) -> JointProbl
     return JointProblem(model, base.records, 0.0, whitener=whitening.matrix)
 
 
-def fit_from(problem: JointProblem, effects, starts, max_steps: int = 10) -> Fitted:
-    """The best mode reached from ``starts`` (starts, dimension)."""
-    z = find_optimum(problem, starts, max_steps, first_steps=5, finalists=1).z
-    return linearised(problem, effects, z)
+def fit_from(problem: JointProblem, effects, starts, steps: tuple[int, int] = (6, 12), finalists: int = 2) -> Fitted:
+    """The best mode reached from ``starts`` (starts, dimension): all climb the first number of steps, some the second."""
+    return linearised(problem, effects, best_mode(problem, starts, steps, finalists))
 
 
 def linearised(problem: JointProblem, effects, z) -> Fitted:
@@ -155,14 +154,14 @@ def rebased(fitted: Fitted, other: Fitted) -> Fitted:
     for i, label in enumerate(fitted.problem.labels):
         if label in other.problem.labels:
             z[i] = other.z[other.problem.labels.index(label)]
-    return fit_from(fitted.problem, fitted.effects, [z], 12)
+    return fit_from(fitted.problem, fitted.effects, [z], (0, 15))
 
 
 def simplified(setting: Setting, fitted: Fitted, effects, whitening: Whitening) -> Fitted:
     """A simpler hypothesis begun from the mode of one that holds it, which may have found a better baseline."""
     problem = joint_problem(setting, effects, whitening)
     start = fitted.z[[fitted.problem.labels.index(label) for label in problem.labels]]
-    return fit_from(problem, effects, [start], 20)
+    return fit_from(problem, effects, [start], (0, 20))
 
 
 def polished(fitted: Fitted, rng) -> Fitted:
@@ -178,7 +177,7 @@ def polished(fitted: Fitted, rng) -> Fitted:
         row = own.stop
     model = replace(problem.model, members=tuple(m for m in problem.model.members if m.name not in fitted.effects))
     cleaned = replace(problem, model=model, records=tuple(records))
-    starts = np.repeat(fitted.z[None], FEATURE_STARTS + 1, axis=0)
+    starts = np.repeat(fitted.z[None], FEATURE_STARTS, axis=0)
     known = [problem.labels.index(label) for label in cleaned.labels]
-    starts[1:, known] = feature_starts(cleaned, rng)
-    return fit_from(problem, fitted.effects, starts, 30)
+    starts[:, known] = feature_starts(cleaned, rng)
+    return fit_from(problem, fitted.effects, np.concatenate([scattered(fitted.z, rng), starts]), (12, 40), 4)

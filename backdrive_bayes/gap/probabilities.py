@@ -27,7 +27,7 @@ class Calibration:
     pair: float = 0.08
     unknown: float = 0.22
     fast: float = 0.15
-    misfit: tuple[float, ...] = (0.4, 0.35, 0.15, 0.07, 0.02, 0.01)
+    misfit: tuple[float, ...] = (0.4, 0.35, 0.17, 0.07, 0.01)
     unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
     beside_level: tuple[float, ...] = (0.0, 0.0, 0.0, 0.1, 0.1, 0.1)
 

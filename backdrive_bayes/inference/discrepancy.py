@@ -31,6 +31,8 @@ LENGTHS = np.array([0.01, 0.03, 0.1, 0.3])
 ROUGHNESS = (1.0, 2.0)
 """Spectral exponents: Matérn-1/2, which may have kinks, and Matérn-3/2, which is smooth."""
 RELATIVE_SCALES = np.geomspace(1e-5, 0.3, 31)
+WORTHWHILE = 4.0
+"""Log evidence that a discrepancy must gain: the best of a grid of scales and lengths gains some from noise alone."""
 PROBE = 1e-4
 SETTLING_CYCLES = 3
 
@@ -237,6 +239,6 @@ def _most_evident(problem, basis, residual, relative, span, lengths):
                 load = (vector.T @ (deviation * projection)) ** 2
                 gain += 0.5 * np.sum(scale2 * load / spread - np.log(spread), axis=1)
             k = int(np.argmax(gain))
-            if gain[k] > best[3]:
+            if gain[k] > max(best[3], WORTHWHILE):
                 best = (float(span * RELATIVE_SCALES[k]), float(length), roughness, float(gain[k]))
     return best

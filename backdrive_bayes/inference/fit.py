@@ -16,7 +16,7 @@ from backdrive_bayes.inference.noise_refinement import refine_noise
 from backdrive_bayes.inference.optimum import Optimum, find_optimum
 from backdrive_bayes.inference.problem import Problem, RecordData
 from backdrive_bayes.inference.sampling import Ensembles, Settings, begin_ensembles, run_ensembles, warm_up
-from backdrive_bayes.inference.starts import feature_starts, screened_starts, with_other_pasts
+from backdrive_bayes.inference.starts import feature_starts, scattered, screened_starts, with_other_pasts
 from backdrive_bayes.model.parameter import Scale
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
@@ -99,7 +99,8 @@ def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, bloc
     blocks = [reduce_record(r, s, n, blocks_per_segment) for r, s, n in zip(unit.records, segments, noise, strict=True)]
     problem = Problem(model, tuple(RecordData.prepare(b, n) for b, n in zip(blocks, noise, strict=True)))
     optimum = find_optimum(problem, np.concatenate([screened_starts(problem, rng), feature_starts(problem, rng)]))
-    optimum = find_optimum(problem, [optimum.z, with_other_pasts(problem, optimum.z, rng)])
+    starts = np.concatenate([[with_other_pasts(problem, optimum.z, rng)], scattered(optimum.z, rng)])
+    optimum = find_optimum(problem, starts)
     return _refine(problem, optimum)
 
 

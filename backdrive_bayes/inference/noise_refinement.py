@@ -46,9 +46,11 @@ def refine_noise(problem: Problem, z, discrepancy: Discrepancy, slopes):
 
     bounds = [(c - 2.5, c + 2.5) for c in start[:2]] + [(start[2] - 6, start[2] + 3), (start[3] - 3, start[3] + 5)]
     best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 25, "eps": 1e-3, "ftol": 1e-6})
-    sd = np.sqrt(np.diag(np.linalg.pinv(_curvature(cost, best.x), hermitian=True)))[:2]
+    covariance = np.linalg.pinv(_curvature(cost, best.x), hermitian=True)[:2, :2]
+    sd = np.sqrt(np.diag(covariance))
     correlated, correlation = (float(v) for v in np.exp(best.x[:2]))
-    dof = float(np.clip(2.0 / max((2 * sd[0]) ** 2, 1e-9), 4.0, 1e5))
+    # Means over much longer than the correlation time have a variance in proportion to σ²t_c.
+    dof = float(np.clip(2.0 / max(np.array([2.0, 1.0]) @ covariance @ [2.0, 1.0], 1e-9), 4.0, 1e5))
     refined = tuple(
         replace(
             d.noise,

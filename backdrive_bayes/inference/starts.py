@@ -9,6 +9,8 @@ import numpy as np
 from backdrive_bayes.inference.problem import Problem
 
 GRID = 400
+SCATTER = 0.7
+"""Prior standard deviations by which starts are scattered around a mode."""
 HARDENING_RATIOS, RELEASE_SHARES = (1.0, 0.5), (0.05, 0.25)
 FEATURE_STARTS = len(HARDENING_RATIOS) * len(RELEASE_SHARES)
 
@@ -67,6 +69,13 @@ def _features(problem) -> dict[str, float]:
         "friction_torque": max(0.5 * at[beyond] / compliance, 1e-3 * amplitude),
         "friction_ratio": max(0.5 * (at[half] - at[beyond]) / compliance / (half - beyond), 0.01),
     }
+
+
+def scattered(z, rng, starts: int = 8) -> np.ndarray:
+    """``z`` and starts scattered around it, shape (starts, dimension): ridges and small modes trap a single climb."""
+    noise = SCATTER * rng.standard_normal((starts, z.size))
+    noise[0] = 0.0
+    return z + noise
 
 
 def with_other_pasts(problem: Problem, z, rng, tries: int = 128) -> np.ndarray:

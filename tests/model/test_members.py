@@ -22,7 +22,8 @@ from backdrive_bayes.model.registry import BASELINE, MEMBERS, members_named
 
 NAMES = tuple(MEMBERS)
 HISTORY = {
-    "initial_gap_position", "initial_friction_state", "initial_second_gap_position", "initial_creep", "initial_slip", "torque_offset",
+    "initial_gap_position", "initial_friction_state", "initial_second_gap_position", "initial_creep", "initial_slip",
+    "torque_offset",
 }  # fmt: skip
 ONE_SIDED = {"asymmetric_stiffness", "encoder_error", "thermal_drift"}
 """Effects that single out a direction of the torque or of the angle, or heed neither."""

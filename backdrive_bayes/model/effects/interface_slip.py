@@ -22,7 +22,7 @@ class InterfaceSlip:
     name = "interface_slip"
     stage = Stage.COMPLIANCE
     signature = "only above a threshold torque, only while loading, and it stays until the load is reversed"
-    source = "the suspicion of doi:10.1177/00202940261442382 on its 3 N·m unit; micro-slip of clamped joints, doi:10.1115/1.3625046"
+    source = "the suspicion of doi:10.1177/00202940261442382 on its 3 N·m unit; sliders, doi:10.1115/1.3625046"
     parameters = (
         Parameter("slip_angle", "rad", "angle", LogNormal(0.03, 1.2), 0.0, CLAMP),
         Parameter("slip_threshold", "N·m", "torque", Uniform(0.35, 0.97), None, CLAMP),

@@ -12,9 +12,10 @@ REFERENCE = 0.5
 
 
 class RateDependentFriction:
-    """All torque that friction holds back is multiplied by (rate / (0.5 T_r/s))^c; c of either sign, no relaxation.
+    """All torque that friction holds back is multiplied by exp(c x + b x²), x = ln(rate / (0.5 T_r/s)); no relaxation.
 
-    The logarithmic law of dry and boundary-lubricated contacts, as a power so that friction stays positive.
+    The logarithmic law of dry and boundary-lubricated contacts, as a power c of either sign so that friction stays positive; the
+    bend b lets it level off or turn as Stribeck's curve does.
     """
 
     name = "rate_dependent_friction"
@@ -23,10 +24,11 @@ class RateDependentFriction:
     source = "rate-and-state friction, doi:10.1029/JB088iB12p10359; Stribeck's falling branch"
     parameters = (
         Parameter("friction_rate_exponent", "1", "none", Normal(0.12), 0.0, "some per cent to some tens of per cent a decade"),
+        Parameter("friction_rate_bend", "1", "none", Normal(0.06), 0.0, "a fraction of the exponent over a decade"),
     )
 
     def respond(self, values, drive):
         """Transmitted torque [N·m], shape (…, samples)."""
-        rate = np.maximum(drive.path.rate_nm_per_s / (REFERENCE * drive.rated_torque_nm), 1e-12)
-        held = drive.torque_nm - drive.transmitted_nm
-        return drive.torque_nm - held * rate ** values["friction_rate_exponent"]
+        rate = np.log(np.maximum(drive.path.rate_nm_per_s / (REFERENCE * drive.rated_torque_nm), 1e-3))
+        change = values["friction_rate_exponent"] * rate + values["friction_rate_bend"] * rate**2
+        return drive.torque_nm - (drive.torque_nm - drive.transmitted_nm) * np.exp(np.minimum(change, 3.0))
