@@ -17,6 +17,8 @@ AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
 SINE_AMPLITUDES = np.geomspace(0.05, 20.0, 24)
 PERIODS = 160
 HARMONICS = 3
+HIGHEST_LINE = 0.95
+"""Share of the Nyquist frequency: quanta beat with the sampling just below it."""
 PIECE = 60
 """Fine blocks of a leg over which skewness is taken."""
 
@@ -118,13 +120,13 @@ def _lines(setting, fitted):
 
 
 def _spectrum_ratio(time, residual):
-    """Periodogram over its running median, and frequencies [Hz]; the lowest two hundred ordinates are left out."""
+    """Periodogram over its running median, and frequencies [Hz]; the lowest two hundred ordinates and the highest are left out."""
     step = float(np.median(np.diff(time)))
     taper = np.hanning(residual.size)
     power = np.abs(np.fft.rfft((residual - residual.mean()) * taper)) ** 2
     frequency = np.fft.rfftfreq(residual.size, step)
     level = median_filter(power, 101, mode="nearest") / np.log(2.0)
-    keep = slice(min(200, power.size // 4), power.size - 10)
+    keep = slice(min(200, power.size // 4), int(HIGHEST_LINE * power.size))
     return power[keep] / np.maximum(level[keep], 1e-300), frequency[keep]
 
 

@@ -14,10 +14,10 @@ from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.play import play
 
 MESH = "weakly informative; losses of a few per cent a mesh and no-load torques in catalogues, short of self-locking"
-LOAD_RATIOS = np.array([0.0, 0.015, 0.04, 0.08, 0.15, 0.3, 0.55, 0.9])
+LOAD_RATIOS = np.array([0.0, 0.01, 0.02, 0.035, 0.055, 0.08, 0.115, 0.16, 0.22, 0.3, 0.42, 0.6, 0.9])
 SHIFT_STEP = 0.02
 """Step in T_r between the errors of the torque reading for which the bank is made; between them it is interpolated."""
-CONSTANT_SHARES = np.r_[0.0, np.geomspace(0.002, 1.6, 12)]
+CONSTANT_SHARES = np.r_[0.0, np.geomspace(0.002, 1.6, 17)]
 
 
 class Friction:
