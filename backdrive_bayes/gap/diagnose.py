@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.gap import draws, next_test, where
 from backdrive_bayes.gap.candidates import REFERENCE, Candidates, Weighed, weigh_all
-from backdrive_bayes.gap.fast import Fast, weigh_fast
+from backdrive_bayes.gap.fast import VIBRATION, Fast, weigh_fast
 from backdrive_bayes.gap.probabilities import Evidences, credible_set, marginal, probabilities
 from backdrive_bayes.gap.setting import Setting
 from backdrive_bayes.gap.shrink import closed_fraction, shrink
@@ -71,7 +71,7 @@ def _diagnose(unit, baseline, seed, allowed, k, progress):
 def _allowed_fast(fast, allowed):
     if allowed is None:
         return fast
-    kept = {n: v for n, v in fast.log_evidence.items() if n in allowed or n == "vibration"}
+    kept = {n: v for n, v in fast.log_evidence.items() if n in allowed or n == VIBRATION}
     return replace(fast, log_evidence=kept)
 
 

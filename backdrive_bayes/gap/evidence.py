@@ -25,7 +25,7 @@ def log_evidence(setting: Setting, fitted: Fitted, *terms) -> float:
     levels count alike.
     """
     base = setting.covariance(*terms)
-    if not fitted.effects:
+    if not fitted.contributions:
         return _gaussian(setting, fitted, base)
     shape = formula_error(setting, fitted)
     return float(logsumexp([_gaussian(setting, fitted, base + level**2 * shape) for level in FORMULA_ERRORS], b=1 / 2))

@@ -12,6 +12,7 @@ from backdrive_bayes.gap.fine import FineLeg, fine_legs
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
 
+ENCODER_ERROR, STICK_SLIP, VIBRATION = "encoder_error", "stick_slip", "vibration"
 AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
 """Prior standard deviations of a fast component, in those of the noise."""
 SINE_AMPLITUDES = np.geomspace(0.05, 20.0, 24)
@@ -36,9 +37,9 @@ def weigh_fast(setting: Setting, fitted: Fitted) -> Fast:
     legs = fine_legs(setting, fitted)
     saw, jumps = _saw_of_torque(setting, legs, _torque_periods(setting)), _jumps(legs)
     found = {
-        "encoder_error": _sine_of_angle(setting, legs, _angle_periods(legs)),
-        "stick_slip": max(saw, (jumps, float("nan"))),
-        "vibration": _lines(setting, fitted),
+        ENCODER_ERROR: _sine_of_angle(setting, legs, _angle_periods(legs)),
+        STICK_SLIP: max(saw, (jumps, float("nan"))),
+        VIBRATION: _lines(setting, fitted),
     }
     return Fast({k: v[0] for k, v in found.items()}, {k: v[1] for k, v in found.items()})
 
@@ -120,7 +121,7 @@ def _lines(setting, fitted):
 
 
 def _spectrum_ratio(time, residual):
-    """Periodogram over its running median, and frequencies [Hz]; the lowest two hundred ordinates and the highest are left out."""
+    """Periodogram over its running median, and frequencies [Hz], without the two hundred lowest and the highest."""
     step = float(np.median(np.diff(time)))
     taper = np.hanning(residual.size)
     power = np.abs(np.fft.rfft((residual - residual.mean()) * taper)) ** 2

@@ -13,12 +13,16 @@ import numpy as np
 from scipy.special import logsumexp
 
 from backdrive_bayes.gap.candidates import Candidates
-from backdrive_bayes.gap.fast import Fast
+from backdrive_bayes.gap.fast import STICK_SLIP, VIBRATION, Fast
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Temperatures of slow and fast evidences, and prior weights; misfit weights follow ``MISFIT_LEVELS``."""
+    """Temperatures of slow and fast evidences, and prior weights; misfit weights follow ``MISFIT_LEVELS``.
+
+    ``imprint`` multiplies the temperature of slow evidences beside stick-slip, whose jumps leave traces in wide blocks that no
+    slow model explains; ``triple`` is the share left to three effects at once.
+    """
 
     temperature: float = 4.0
     fast_temperature: float = 4.0
@@ -27,6 +31,8 @@ class Calibration:
     pair: float = 0.08
     unknown: float = 0.22
     fast: float = 0.15
+    imprint: float = 2.0
+    triple: float = 0.02
     misfit: tuple[float, ...] = (0.4, 0.35, 0.17, 0.07, 0.01)
     unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
     beside_level: tuple[float, ...] = (0.0, 0.0, 0.0, 0.1, 0.1, 0.1)
@@ -64,33 +70,36 @@ class Evidences:
 
 def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects, () for none and ("unknown",) for something not in the library; they sum to one."""
-    slow, quick = _slow(evidences, calibration), _fast(evidences.fast, calibration)
+    quick = _fast(evidences.fast, calibration)
+    slow = {hot: _slow(evidences, calibration, calibration.temperature * hot) for hot in (1.0, calibration.imprint)}
     joint: dict[tuple[str, ...], float] = {}
-    for effects, p in slow.items():
-        for name, q in quick.items():
+    for name, q in quick.items():
+        for effects, p in slow[calibration.imprint if name == STICK_SLIP else 1.0].items():
             both = _union(effects, name)
-            joint[both] = joint.get(both, 0.0) + p * q
-    return joint
+            share = calibration.triple if len(both) > 2 else 1.0
+            joint[both] = joint.get(both, 0.0) + p * q * share
+    total = sum(joint.values())
+    return {effects: p / total for effects, p in joint.items()}
 
 
 def _union(effects, fast):
-    if fast == "vibration" or effects == UNKNOWN:
+    if fast == VIBRATION or effects == UNKNOWN:
         return UNKNOWN
     return effects if fast is None or fast in effects else tuple(sorted((*effects, fast)))
 
 
-def _slow(evidences, c):
+def _slow(evidences, c, temperature):
     misfit = np.log(c.misfit)
     singles = sum(len(effects) == 1 for effects in evidences.slow)
     share = {0: c.none, 1: c.single / max(singles, 1), 2: c.pair / max(singles * (singles - 1) / 2, 1)}
     score = {
-        effects: np.log(share[len(effects)]) + logsumexp(values + misfit) / c.temperature
+        effects: np.log(share[len(effects)]) + logsumexp(values + misfit) / temperature
         for effects, values in evidences.slow.items()
     }
     with np.errstate(divide="ignore"):
         levels = np.log([c.unknown_level, c.beside_level])[:, None, :]
     total = logsumexp(evidences.unexplained + levels) - np.log(evidences.unexplained.shape[1])
-    score[UNKNOWN] = np.log(c.unknown) + total / c.temperature
+    score[UNKNOWN] = np.log(c.unknown) + total / temperature
     return _normalised(score)
 
 
