@@ -97,7 +97,7 @@ def _polish_best(setting, weighed, rng):
     best = max(table.values(), key=lambda w: w.log_evidence.max())
     parts = [effects for effects in table if len(effects) < len(best.effects) and set(effects) <= set(best.effects)]
     for effects in parts:
-        simpler = simplified(setting, best.fitted, effects, setting.whitening(REFERENCE))
+        simpler = polished(simplified(setting, best.fitted, effects, setting.whitening(REFERENCE)), rng)
         table[effects] = _better(table[effects], _weigh(setting, simpler))
     return [table[w.effects] for w in weighed]
 

@@ -9,12 +9,16 @@ from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
 
 
+BEND_ERROR = 0.3
+"""Relative standard error of the correction for the curve's bend within a block: it was made at one mode, of one past."""
+
+
 def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0) -> np.ndarray:
     """Covariance of the block means of the angle [rad²], shape (blocks, blocks).
 
     The correlated part is the mean of σ² exp(-|t-t'|/t_c) over all pairs of samples of two blocks, as geometric sums; the white
     part falls with the number of samples; the torque path's error, of each block and of its leg as a whole, enters through
-    ``slope_rad_per_nm`` (blocks,).
+    ``slope_rad_per_nm`` (blocks,). A corrected mean carries part of its correction as error.
     """
     n, span = blocks.count, blocks.end_s - blocks.begin_s
     # Samples some hundred correlation times apart are independent to the last bit.
@@ -27,7 +31,8 @@ def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0)
     np.fill_diagonal(matrix, (n + 2 * (n - total) / np.expm1(decay)) / n**2)
     matrix *= noise.correlated_rad**2
     white = noise.white_rad**2 / blocks.count
-    matrix[np.diag_indices_from(matrix)] += white + slope_rad_per_nm**2 * blocks.torque_variance_nm2
+    own = white + slope_rad_per_nm**2 * blocks.torque_variance_nm2 + (BEND_ERROR * blocks.bend_rad) ** 2
+    matrix[np.diag_indices_from(matrix)] += own
     return matrix + _path_covariance(blocks, slope_rad_per_nm)
 
 
