@@ -15,6 +15,7 @@ from backdrive_bayes.decisions.comparison import ROPE
 from backdrive_bayes.decisions.comparison import compare as compare_evidence
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.limits import Limits, read_limits
+from backdrive_bayes.indicators.loads import loads_json
 from backdrive_bayes.records import record
 from backdrive_bayes.records.unit_folder import read_unit
 
@@ -49,6 +50,11 @@ class Fit:
     def converged(self) -> bool:
         """Whether every parameter and indicator passed the diagnostics."""
         return bool(self.indicators["convergence"]["converged"])
+
+    def back_drive(self, *loads: float, rate: float | None = None) -> list[dict]:
+        """Angle θ_L [rad] and energy W_L [J] with intervals for loads [N·m] at a rate [N·m/s], by default every measured one."""
+        options = FitOptions(loads=loads, load_rate=rate)
+        return loads_json(self.posterior, options.loads, options.load_rate, self.indicators["level"])
 
     def save(self, folder: Path | str, figures: bool = True) -> Path:
         """Write indicators.json, posterior.nc and figures, as the verb ``fit`` does."""
@@ -154,11 +160,17 @@ class Comparison:
         return out
 
 
-def fit(unit, *, k: float = 0.03, level: float = 0.9, seed: int = 0, budget: float = 120.0, baseline=None, progress=None) -> Fit:
-    """Posterior and indicators of a unit (or of the path of one); ``budget`` in seconds, ``progress`` is told where it stands."""
+def fit(
+    unit, *, k=0.03, level=0.9, seed: int = 0, budget: float = 120.0, baseline=None, loads=(), load_rate=None, progress=None
+) -> Fit:
+    """Posterior and indicators of a unit (or of the path of one); ``budget`` in seconds, ``progress`` is told where it stands.
+
+    ``loads`` [N·m], arriving at ``load_rate`` [N·m/s] or at every measured rate, are answered under ``indicators["loads"]``.
+    """
     given = {} if baseline is None else {"baseline": tuple(baseline)}
+    options = FitOptions(k=k, level=level, seconds=budget, seed=seed, loads=tuple(loads), load_rate=load_rate, **given)
     unit = unit if isinstance(unit, record.Unit) else Unit.read(unit)
-    return Fit(*fit_unit(unit, FitOptions(k=k, level=level, seconds=budget, seed=seed, **given), progress or (lambda text: None)))
+    return Fit(*fit_unit(unit, options, progress or (lambda text: None)))
 
 
 def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, budget: float = 30.0, baseline=None, progress=None) -> Diagnosis:
@@ -188,15 +200,19 @@ def compare(*fitted, claims=None, rope: float = ROPE, seed: int = 0) -> Comparis
     return Comparison(compare_evidence(evidences, read_claims(claims) if claims else None, rope, level, seed))
 
 
-def report(*results, out: Path | str) -> Path:
-    """Save the results (or take folders that hold some) below ``out`` and make out/report.pdf of them."""
+def report(*results, out: Path | str, template: Path | str | None = None) -> Path:
+    """Save the results (or take folders that hold some) below ``out`` and make out/report.pdf of them.
+
+    ``template`` is a folder with a company's template.toml and logo.
+    """
+    from backdrive_bayes.commands.report import read_template
     from backdrive_bayes.report.report import write_report
 
     folders = []
     for number, result in enumerate(results, 1):
         own = Path(out) / f"{number}-{type(result).__name__.lower()}"
         folders.append(Path(result) if isinstance(result, str | Path) else result.save(own, figures=False))
-    return write_report(folders, Path(out) / "report.pdf")
+    return write_report(folders, Path(out) / "report.pdf", read_template(template) if template else None)
 
 
 def _evidence(fitted) -> Evidence:

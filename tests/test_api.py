@@ -55,6 +55,8 @@ def test_saved_fits_are_as_good_as_fresh_ones(tmp_path):
 def test_report_can_be_called_however_it_was_found(tmp_path):
     verdict = backdrive_bayes.accept(evidence(), Limits((Limit("peak_angle_rad", hi=1.0),)))
     assert backdrive_bayes.report(verdict, out=tmp_path).stat().st_size > 10_000
+    dressed = backdrive_bayes.report(verdict, out=tmp_path / "dressed", template=ROOT / "examples" / "template")
+    assert dressed.read_bytes() != (tmp_path / "report.pdf").read_bytes()
     import_module("backdrive_bayes.report.report")
     assert backdrive_bayes.report(verdict, out=tmp_path / "again").exists()
 

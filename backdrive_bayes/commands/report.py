@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from backdrive_bayes.errors import BadInput
+
 HELP = "make one PDF from result folders; computes nothing"
 NAME = "report.pdf"
 
@@ -17,6 +19,12 @@ def add_arguments(parser) -> None:
         metavar="OUT",
         help="result folders; the PDF goes into the first unless -o says where",
     )
+    parser.add_argument(
+        "--template",
+        type=Path,
+        metavar="FOLDER",
+        help="a company's template: template.toml (name, colours, fields, footer) and logo.svg or logo.png",
+    )
 
 
 def run(args) -> int:
@@ -25,7 +33,24 @@ def run(args) -> int:
     from backdrive_bayes.report.report import write_report
 
     out = args.out or args.results[0]
+    given = getattr(args, "template", None)
+    template = read_template(given) if given else None
     with write_folder(out) as folder:
-        write_report(args.results, folder / NAME)
+        write_report(args.results, folder / NAME, template)
     say(f"report written to {out / NAME}")
     return 0
+
+
+def read_template(folder: Path):
+    """A company's template for the report; BadInput says which file or key of the folder cannot be used."""
+    from backdrive_bayes.records.toml_file import read_toml
+    from backdrive_bayes.report.company import FILE_NAME, company_template
+    from backdrive_bayes.report.logo import NAMES, read_logo
+
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise BadInput(folder, "a template folder", "a file" if folder.exists() else "no such folder")
+    logo, path = read_logo(folder), folder / FILE_NAME
+    if not path.exists() and logo is None:
+        raise BadInput(folder, f"a template folder with {', '.join([FILE_NAME, *NAMES])}", "none of them")
+    return company_template(path, read_toml(path, "a template file") if path.exists() else {}, logo)

@@ -24,6 +24,9 @@ UNKNOWN_KINDS = (("loop", 0.02), ("own_loop", 0.06), ("time_smooth", 0.1), ("tim
 UNKNOWN_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
 PAIRS_FITTED = 4
 POLISHED = 3
+SEARCHES = 3
+SETTLED = 5.0
+"""Log posterior by which a fresh search may find a better mode before another is due."""
 WORTHWHILE = 4.0
 """Log-likelihood by which a pair must beat its better half in the linear search to be fitted."""
 
@@ -45,11 +48,13 @@ class Weighed:
 class Candidates:
     """Every hypothesis weighed, and the log evidence of unexplained structure, (2, kinds, levels).
 
-    ``unexplained[0]`` is beside the baseline alone, ``unexplained[1]`` beside the best single effect.
+    ``unexplained[0]`` is beside the baseline alone, ``unexplained[1]`` beside the best single effect. ``settled`` tells whether a
+    fresh search for the best hypothesis's mode came back to it.
     """
 
     weighed: tuple[Weighed, ...]
     unexplained: np.ndarray
+    settled: bool = True
 
     @property
     def best(self) -> Weighed:
@@ -78,10 +83,10 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
         known, other = sorted(pair, key=lambda n: -max(_weigh(setting, singles[n]).log_evidence))
         found = screen(setting, singles[known], other, reference, rng, 128)
         weighed.append(_weigh(setting, fit_screened(found, pair, rng)))
-    weighed = _polish_best(setting, weighed, rng)
+    weighed, settled = _settle(setting, _polish_best(setting, weighed, rng), rng)
     best = max(weighed[1 : len(names) + 1], key=lambda w: w.log_evidence.max(), default=weighed[0])
     unexplained = np.array([_unexplained(setting, fitted) for fitted in (none, best.fitted)])
-    return Candidates(tuple(weighed), unexplained)
+    return Candidates(tuple(weighed), unexplained, settled)
 
 
 def _polish_best(setting, weighed, rng):
@@ -100,6 +105,19 @@ def _polish_best(setting, weighed, rng):
         simpler = polished(simplified(setting, best.fitted, effects, setting.whitening(REFERENCE)), rng)
         table[effects] = _better(table[effects], _weigh(setting, simpler))
     return [table[w.effects] for w in weighed]
+
+
+def _settle(setting, weighed, rng):
+    """The best hypothesis searched anew until that finds nothing better; and whether it ever did so."""
+    for _ in range(SEARCHES):
+        best = max(weighed, key=lambda w: w.log_evidence.max())
+        again = polished(best.fitted, rng)
+        before, after = best.fitted.problem.log_posterior(np.array([best.fitted.z, again.z]))
+        if after <= before + SETTLED:
+            return weighed, True
+        better = _better(best, _weigh(setting, again))
+        weighed = [better if w is best else w for w in weighed]
+    return weighed, False
 
 
 def _better(one, other):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -18,6 +19,7 @@ from backdrive_bayes.gap.shrink import closed_fraction, shrink
 from backdrive_bayes.indicators.summary import interval, loading_rate_nm_per_s
 from backdrive_bayes.inference.discrepancy import amplitude_nm
 from backdrive_bayes.model.registry import BASELINE, candidates_beside
+from backdrive_bayes.records.check import check_unit
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.results import DIAGNOSIS
 
@@ -100,7 +102,7 @@ class _Found:
             "baseline": list(baseline),
             "level": LEVEL,
             "k": self.k,
-            "inconclusive": "",
+            "inconclusive": self.inconclusive,
             "records": [
                 {
                     "file": d.blocks.name,
@@ -154,8 +156,20 @@ class _Found:
         return rows
 
     def _answer(self):
-        names = [] if self.effects == () else list(self.effects)
+        # No name where there is no verdict.
+        names = [] if self.inconclusive else list(self.effects)
         return {"effects": names, "credible_set_90": credible_set(self.labels)}
+
+    @cached_property
+    def inconclusive(self) -> str:
+        """Why there is no verdict and what to do, empty where there is one."""
+        checked = check_unit(self.setting.unit)
+        if not checked["may_infer"]:
+            return checked["reason"]
+        if not self.candidates.settled:
+            named = " + ".join(self.candidates.best.effects) or "the baseline"
+            return f"every fresh search still found a better fit of {named}: run it again with another --seed, or add a record"
+        return ""
 
     def _shrink(self, none, chosen, gap, z_none, z_chosen):
         found = shrink(self.setting, none, chosen.fitted, gap.weight, self.rng)

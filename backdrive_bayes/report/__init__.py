@@ -12,8 +12,8 @@ from types import ModuleType
 class _Room(ModuleType):
     """The room can be called: ``from backdrive_bayes import report`` finds the function or, once imported, this room."""
 
-    def __call__(self, *results, out):
-        return import_module("backdrive_bayes.api").report(*results, out=out)
+    def __call__(self, *results, **options):
+        return import_module("backdrive_bayes.api").report(*results, **options)
 
 
 sys.modules[__name__].__class__ = _Room

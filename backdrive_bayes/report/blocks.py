@@ -96,6 +96,13 @@ class Signature(Block):
 
 
 @dataclass(frozen=True)
+class Letterhead(Block):
+    """A company's letterhead; what it says stands once in the report's data."""
+
+    kind = "letterhead"
+
+
+@dataclass(frozen=True)
 class Chapter:
     """What one result contributes: a summary of one page, details, and the figures that its pictures name."""
 

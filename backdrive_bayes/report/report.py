@@ -11,19 +11,24 @@ from importlib.resources import files
 from pathlib import Path
 
 from backdrive_bayes.errors import MissingExtra
+from backdrive_bayes.report.company import CompanyTemplate
+from backdrive_bayes.report.dress import dressed
+from backdrive_bayes.report.logo import refuse_undrawable
 from backdrive_bayes.report.text import Free, every_string, free, map_strings, printable, typeset
 
 STANDARD = "ua-1"
 """PDF/UA-1: tagged, titled, with alternative texts. (PDF/A would force a creation date into the file.)"""
 NAMED = 4
+TITLE = "Backdrivability report"
+_LAYOUT = ("template.typ", "company.typ")
 
 
-def write_report(folders: Iterable[Path], out_pdf: Path) -> Path:
-    """Write one PDF of all results in ``folders``; the same results give the same bytes.
+def write_report(folders: Iterable[Path], out_pdf: Path, template: CompanyTemplate | None = None) -> Path:
+    """Write one PDF of all results in ``folders``, dressed in a company's template; the same input gives the same bytes.
 
-    Raises BadInput for a folder without results, MissingExtra without typst or matplotlib.
+    Raises BadInput for a folder without results or a logo that cannot be drawn, MissingExtra without typst or matplotlib.
     """
-    pdf = report_bytes([Path(f) for f in folders])
+    pdf = report_bytes([Path(f) for f in folders], template)
     out_pdf = Path(out_pdf)
     out_pdf.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(suffix=".pdf", dir=out_pdf.parent)
@@ -37,23 +42,27 @@ def write_report(folders: Iterable[Path], out_pdf: Path) -> Path:
     return out_pdf
 
 
-def report_bytes(folders: list[Path]) -> bytes:
+def report_bytes(folders: list[Path], template: CompanyTemplate | None = None) -> bytes:
     """The PDF of :func:`write_report` as bytes."""
-    return compile_report(folders, format="pdf", pdf_standards=[STANDARD])
+    return compile_report(folders, template, format="pdf", pdf_standards=[STANDARD])
 
 
-def compile_report(folders: list[Path], **options):
+def compile_report(folders: list[Path], template: CompanyTemplate | None = None, **options):
     """What Typst makes of the report with the given output options (bytes, or a list of bytes for images)."""
     typst = _typst()
     from backdrive_bayes.report.sections import chapters
 
+    if template and template.logo:
+        refuse_undrawable(template.logo, typst)
     found = [c for folder in folders for c in chapters(folder)]
     with tempfile.TemporaryDirectory() as name:
         room = Path(name)
-        data, fonts = _fit_to_fonts(_data(found, room), typst)
+        data = _data(found, room, template.title if template and template.title else TITLE)
+        data, fonts = _fit_to_fonts(dressed(data, template, room) if template else data, typst)
         (room / "data.json").write_text(json.dumps(data), encoding="utf-8")
-        template = files("backdrive_bayes.report").joinpath("template.typ").read_text(encoding="utf-8")
-        (room / "template.typ").write_text(template, encoding="utf-8")
+        for layout in _LAYOUT:
+            text = files("backdrive_bayes.report").joinpath(layout).read_text(encoding="utf-8")
+            (room / layout).write_text(text, encoding="utf-8")
         return typst.compile(str(room / "template.typ"), root=str(room), **fonts, **options)
 
 
@@ -65,7 +74,7 @@ def _typst():
     return typst
 
 
-def _data(found, room: Path) -> dict:
+def _data(found, room: Path, title: str) -> dict:
     """Everything that the template prints; figures are written into ``room``."""
     from backdrive_bayes.report.blocks import Heading
     from backdrive_bayes.report.method_text import method_blocks
@@ -78,7 +87,7 @@ def _data(found, room: Path) -> dict:
         details = [[Heading(c.title, 1).data(), *blocks] for c, blocks in zip(found, details, strict=True)]
     names = [c.title for c in found]
     shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
-    title = free(f"Backdrivability report: {shown}", 160)
+    title = free(f"{title}: {shown}", 160)
     method = [b.data() for b in method_blocks()]
     author = f"backdrive-bayes {version('backdrive-bayes')}"
     return {
