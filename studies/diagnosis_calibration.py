@@ -89,23 +89,20 @@ def show(result):
     print(result["index"], verdict, result["truth"], names, said, f"{result['seconds']:.0f} s", flush=True)
 
 
-FREE = ("temperature", "fast_temperature", "none", "single", "pair", "unknown", "fast", "misfit_slope", "beside")
-
-
 def with_values(values):
-    """A calibration from free logarithms: temperatures above one, prior weights that sum to one."""
-    t, ft, none, single, pair, unknown, fast, slope, beside = values
+    """A calibration from free values: temperatures above one, prior weights that sum to one."""
+    t, ft, none, single, pair, unknown, fast, slope, beside, imprint = values
     prior = np.exp([none, single, pair, unknown])
     prior /= prior.sum()
     misfit = np.exp(-np.exp(slope) * np.arange(len(CALIBRATION.misfit)))
     return replace(
         CALIBRATION, temperature=1 + np.exp(t), fast_temperature=1 + np.exp(ft), none=prior[0], single=prior[1], pair=prior[2],
-        unknown=prior[3], fast=1 / (1 + np.exp(-fast)), misfit=tuple(misfit / misfit.sum()),
+        unknown=prior[3], imprint=1 + np.exp(imprint), fast=1 / (1 + np.exp(-fast)), misfit=tuple(misfit / misfit.sum()),
         beside_level=tuple(np.array(CALIBRATION.beside_level) / sum(CALIBRATION.beside_level) / (1 + np.exp(-beside))),
     )  # fmt: skip
 
 
-START = np.array([np.log(3.0), np.log(3.0), np.log(0.3), np.log(0.4), np.log(0.08), np.log(0.22), -1.7, -0.4, -0.8])
+START = np.array([np.log(3.0), np.log(3.0), np.log(0.3), np.log(0.4), np.log(0.08), np.log(0.22), -1.7, -0.4, -0.8, 0.0])
 
 
 def find(results) -> np.ndarray:

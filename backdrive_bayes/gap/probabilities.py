@@ -24,16 +24,16 @@ class Calibration:
     slow model explains; ``triple`` is the share left to three effects at once.
     """
 
-    temperature: float = 4.0
-    fast_temperature: float = 4.0
-    none: float = 0.3
-    single: float = 0.4
-    pair: float = 0.08
-    unknown: float = 0.22
-    fast: float = 0.15
-    imprint: float = 2.0
+    temperature: float = 7.5
+    fast_temperature: float = 8.0
+    none: float = 0.38
+    single: float = 0.43
+    pair: float = 0.04
+    unknown: float = 0.15
+    fast: float = 0.1
+    imprint: float = 3.4
     triple: float = 0.02
-    misfit: tuple[float, ...] = (0.4, 0.35, 0.17, 0.07, 0.01)
+    misfit: tuple[float, ...] = (0.5, 0.26, 0.13, 0.07, 0.04)
     unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
     beside_level: tuple[float, ...] = (0.0, 0.0, 0.0, 0.1, 0.1, 0.1)
 

@@ -18,7 +18,7 @@ class EncoderError:
     parameters = (
         Parameter("encoder_amplitude", "rad", "angle", LogNormal(0.004, 1.0), 0.0, "thousandths of the peak angle"),
         # A longer period would reproduce the angle itself.
-        Parameter("encoder_period", "rad", "angle", LogUniform(0.01, 0.6), None, "several periods within the loop"),
+        Parameter("encoder_period", "rad", "angle", LogUniform(0.01, 0.45), None, "several periods within the loop"),
         Parameter("encoder_harmonic", "1", "none", Uniform(0.0, 0.7), None, "sine and cosine of unequal size"),
         Parameter("encoder_harmonic_phase", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
         Parameter("encoder_phase", "1", "none", Uniform(0.0, 1.0), None, "no preference", True),
