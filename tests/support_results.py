@@ -21,12 +21,15 @@ RATES = (0.01, 0.05, 0.1)
 CHAINS, DRAWS, BLOCKS = 3, 60, 30
 
 
-def write_result(folder, records=2, **changes):
-    """Write indicators.json and posterior.nc of some records into ``folder`` and return the JSON object."""
+def write_result(folder, records=2, shared=PARAMETERS, **changes):
+    """Write indicators.json and posterior.nc of some records into ``folder`` and return the JSON object.
+
+    ``shared`` maps names of shared parameters to unit and value.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    result = indicators(records) | changes
+    result = indicators(records, shared) | changes
     (folder / "indicators.json").write_text(json.dumps(result), encoding="utf-8")
-    _write_posterior(folder / "posterior.nc", records)
+    _write_posterior(folder / "posterior.nc", records, shared)
     return result
 
 
@@ -38,10 +41,10 @@ def branch(torque, direction):
     return 0.02 * np.tanh(300 * (torque - direction * 0.003)) + 0.15 * torque
 
 
-def indicators(records):
+def indicators(records, shared=PARAMETERS):
     parameters = {
         k: interval(v) | {"unit": u, "prior": "log-normal, median 0.01, log-sd 1"}
-        for k, (u, v) in PARAMETERS.items()
+        for k, (u, v) in shared.items()
     }
     for r in range(records):
         about = {"median": 0.1, "lo": -0.9, "hi": 0.9, "unit": "1", "prior": "uniform on [-1, 1]"}
@@ -131,7 +134,7 @@ def _curves(rising, falling):
     return {"rising_rad": rising.tolist(), "falling_rad": falling.tolist()}
 
 
-def _write_posterior(path, records):
+def _write_posterior(path, records, parameters):
     rng = np.random.default_rng(1)
     legs = (("first", 0.0, 0.1), ("down", 0.1, -0.1), ("up", -0.1, 0.1))
     torque = np.concatenate([np.linspace(a, b, BLOCKS) for _, a, b in legs])
@@ -141,7 +144,7 @@ def _write_posterior(path, records):
     noise = 2e-4 * rng.standard_normal((CHAINS, 20, records * n))
     shared = {
         k: (("chain", "draw"), v * np.exp(0.05 * rng.standard_normal((CHAINS, DRAWS))))
-        for k, (_, v) in PARAMETERS.items()
+        for k, (_, v) in parameters.items()
     }
     groups = {
         "posterior": shared

@@ -26,7 +26,7 @@ class Study:
 
     ``diagnose(folder, allowed)`` gives the object of diagnosis.json and must be importable by a fresh process; ``oracle`` units
     are diagnosed again with nothing but their true effects in the library, ``removed`` ones with all but these. ``write(path,
-    object)`` writes JSON in one step, ``note(text)`` shows progress.
+    object)`` writes JSON in one step, ``note(text, share)`` shows progress.
     """
 
     request: Request
@@ -36,7 +36,7 @@ class Study:
     oracle: int = 0
     removed: int = 0
     workers: int = 1
-    note: Callable[[str], None] = lambda text: None
+    note: Callable[[str, float], None] = lambda text, share: None
 
 
 def run_study(study: Study) -> dict:
@@ -70,7 +70,7 @@ def _sealed_key(study):
         if outcome.error:
             raise RuntimeError(f"{name} could not be drawn: {outcome.error}")
         entries[name] = outcome.value
-        study.note(f"drawn {len(entries)} of {len(calls)} units")
+        study.note(f"drawn {len(entries)} of {len(calls)} units", len(entries) / len(calls))
 
     run_all(draw_and_write, calls, study.workers, drawn)
     data = key_bytes(study.request, [entries[name] for name in calls])
@@ -115,7 +115,8 @@ def _answer(study, kind, calls, opened):
         study.write(
             folder / f"{name}.json", {"schema": ANSWER_SCHEMA, "unit": name, "seconds": round(outcome.seconds, 2), **body}
         )
-        study.note(f"diagnosed {done} of {len(calls)} units ({kind})" + (f": {name} raised" if outcome.error else ""))
+        raised = f": {name} raised" if outcome.error else ""
+        study.note(f"diagnosed {done} of {len(calls)} units ({kind}){raised}", done / len(calls))
 
     run_all(study.diagnose, left, study.workers, keep)
 

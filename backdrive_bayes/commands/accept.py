@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.commands.output import default_out, probability_text, progress, say, write_folder, write_json
+from backdrive_bayes.commands.output import default_out, probability_text, require_out, say, write_folder, write_json
+from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
     FitOptions,
     add_fit_arguments,
@@ -42,6 +43,8 @@ def run(args) -> int:
     from backdrive_bayes.decisions.limits import read_limits
 
     options, limits = FitOptions.of(args), read_limits(args.limits)
+    if args.out:
+        require_out(args.out)
     others, probabilities = _models(args.model)
     batch = [Evidence.read(folder) for folder in args.batch]
     if is_result(args.unit):
@@ -49,9 +52,9 @@ def run(args) -> int:
     else:
         made, evidence, out = _fit(args, limits, options)
     verdict = assess([evidence, *others], limits, probabilities, batch)
-    with write_folder(out) as folder:
+    with progress() as note, write_folder(out) as folder:
         if made:
-            keep_fit(*made, folder, not args.no_figures)
+            keep_fit(*made, folder, not args.no_figures, note)
         write_json(folder / "verdict.json", verdict)
         if not args.no_figures:
             draw_figures("save_verdict_figures", folder)
@@ -74,7 +77,7 @@ def _fit(args, limits, options):
     wanted = {limit.k for limit in limits.limits if limit.k is not None}
     if len(wanted) > 1:
         raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))
-    with progress() as note:
+    with progress(options.seconds) as note:
         posterior, result = fit_unit(unit, replace(options, k=wanted.pop()) if wanted else options, note)
     return (posterior, result), Evidence.of(posterior, result), args.out or default_out(unit.name, "accept")
 

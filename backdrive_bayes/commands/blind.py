@@ -6,7 +6,8 @@ import math
 import os
 from pathlib import Path
 
-from backdrive_bayes.commands.output import progress, say, write_json
+from backdrive_bayes.commands.output import say, write_json
+from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.errors import BadInput, MissingExtra
 
 HELP = "make units with a withheld effect, diagnose them without the key, then open the key and score"

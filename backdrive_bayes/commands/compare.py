@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.commands.output import default_out, probability_text, progress, say, write_folder, write_json
+from backdrive_bayes.commands.output import default_out, probability_text, require_out, say, write_folder, write_json
+from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
     FitOptions,
     add_fit_arguments,
@@ -40,14 +41,16 @@ def run(args) -> int:
         raise BadInput("compare", "two units or more", "one")
     if not 0 < args.rope < 1:
         raise BadInput("--rope", "a share between 0 and 1", args.rope)
+    if args.out:
+        require_out(args.out)
     claims = read_claims(args.claims) if args.claims else None
     evidences, made = _evidences(args, options)
     result = compare(evidences, claims, args.rope, args.level, args.seed)
     out = args.out or default_out("-".join(result["names"][:3]), "compare")
-    with write_folder(out) as folder:
+    with progress() as note, write_folder(out) as folder:
         for name, (posterior, own) in made.items():
             (folder / name).mkdir()
-            keep_fit(posterior, own, folder / name, not args.no_figures)
+            keep_fit(posterior, own, folder / name, not args.no_figures, note)
         write_json(folder / "comparison.json", result)
         if not args.no_figures:
             draw_figures("save_comparison_figures", folder)
@@ -66,7 +69,7 @@ def _evidences(args, options):
         if isinstance(unit, Evidence):
             evidences.append(unit)
             continue
-        with progress() as note:
+        with progress(options.seconds) as note:
             posterior, result = fit_unit(unit, options, lambda text, name=unit.name, note=note: note(f"{name}: {text}"))
         evidences.append(Evidence.of(posterior, result))
         name = default_out(unit.name, "fit").name

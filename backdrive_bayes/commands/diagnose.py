@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.commands.output import default_out, progress, say, write_folder, write_json
+from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
+from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, diagnose_unit, draw_figures, keep_fit, ready_unit
 
 HELP = "find the unmodelled effect behind the gap between model and measurement"
@@ -20,10 +21,12 @@ def add_arguments(parser) -> None:
 
 def run(args) -> int:
     """Diagnose and write diagnosis.json, posterior.nc of the chosen model and figures; 0 done, 4 inconclusive."""
-    unit, options = ready_unit(args.unit)[0], FitOptions.of(args)
+    options = FitOptions.of(args)
+    unit = ready_unit(args.unit)[0]
+    out = args.out or default_out(unit.name, "diagnose")
+    require_out(out)
     with progress() as note:
         result, sampled = diagnose_unit(unit, options, note, not args.no_posterior)
-    out = args.out or default_out(unit.name, "diagnose")
     with write_folder(out) as folder:
         write_json(folder / "diagnosis.json", result)
         if sampled is not None:

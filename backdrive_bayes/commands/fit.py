@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.commands.output import default_out, progress, say, write_folder
+from backdrive_bayes.commands.output import default_out, require_out, say, write_folder
+from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, fit_unit, keep_fit, ready_unit
 
 CHAIN = "chain.h5"
@@ -16,6 +17,15 @@ def add_arguments(parser) -> None:
     """Options of this verb."""
     parser.add_argument("unit", type=Path, metavar="UNIT", help="unit folder or a bare record file")
     add_fit_arguments(parser)
+    parser.add_argument(
+        "--load",
+        type=float,
+        action="append",
+        default=[],
+        metavar="NM",
+        help="also say how far this load [N·m] turns the output and what energy is absorbed (repeatable)",
+    )
+    parser.add_argument("--load-rate", type=float, metavar="NM/S", help="rate at which they arrive (default: every measured one)")
     parser.add_argument("--resume", action="store_true", help="go on with the fit in OUT whose budget ran out")
 
 
@@ -28,14 +38,15 @@ def run(args) -> int:
     for fault in faults:
         say(f"warning: {fault}")
     out = args.out or default_out(unit.name, "fit")
+    require_out(out)
     resume = read_chain(out / CHAIN, unit, options.baseline, options.seed) if args.resume else None
-    with progress() as note:
+    with progress(options.seconds) as note:
         posterior, result = fit_unit(unit, options, note, resume)
-    result["notes"] += faults
-    with write_folder(out) as folder:
-        keep_fit(posterior, result, folder, not args.no_figures)
-        if not posterior.converged:
-            write_chain(posterior, folder / CHAIN)
+        result["notes"] += faults
+        with write_folder(out) as folder:
+            keep_fit(posterior, result, folder, not args.no_figures, note)
+            if not posterior.converged:
+                write_chain(posterior, folder / CHAIN)
     if posterior.converged:
         (out / CHAIN).unlink(missing_ok=True)
     _summarise(result, out)
@@ -52,6 +63,8 @@ def _summarise(result: dict, out: Path) -> None:
         say(f"{result['unit']}: converged in {convergence['seconds']:.1f} s; median [{result['level']:.0%} interval]")
         for record in result["records"]:
             say(f"  {record['file']}: " + ", ".join(_shown(record["indicators"], result["k"])))
+        for row in result.get("loads", []):
+            say(f"  {_load_text(row)}")
     say(f"written to {out}")
 
 
@@ -66,5 +79,16 @@ def _shown(indicators: dict, k: float):
     for key, symbol, factor, unit in names:
         value = indicators[key]
         if value is not None:
-            median, lo, hi = (value[part] * factor for part in ("median", "lo", "hi"))
-            yield f"{symbol} = {median:.4g} [{lo:.4g}, {hi:.4g}]{unit}"
+            yield f"{symbol} = {_scaled(value, factor, unit)}"
+
+
+def _load_text(row: dict) -> str:
+    predicted = f" ({' and '.join(row['predicted'])} not measured)".replace("_", " ") if row["predicted"] else ""
+    turned, absorbed = _scaled(row["theta_L_rad"], ARCMIN, "′"), _scaled(row["W_L_J"], 1e3, " mJ")
+    arrives = f"load {row['load_Nm']:.4g} N·m at {row['loading_rate_Nm_per_s']:.3g} N·m/s"
+    return f"{arrives}: θ_L = {turned}, W_L = {absorbed}{predicted}"
+
+
+def _scaled(value: dict, factor: float, unit: str) -> str:
+    median, lo, hi = (value[part] * factor for part in ("median", "lo", "hi"))
+    return f"{median:.4g} [{lo:.4g}, {hi:.4g}]{unit}"

@@ -10,15 +10,12 @@ import re
 import secrets
 import shutil
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from backdrive_bayes.errors import BadInput
-
-_PLAIN_SECONDS = 5.0
 
 
 def say(text: str = "") -> None:
@@ -41,32 +38,6 @@ def probability_text(probability: float) -> str:
     if probability > 0.999:
         return "above 0.999"
     return "below 0.001" if probability < 0.001 else f"{probability:.3g}"
-
-
-@contextlib.contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """Yield ``note(text)``: one line redrawn on a terminal, elsewhere plain lines every few seconds."""
-    start, stream = time.monotonic(), sys.stderr
-    terminal = stream.isatty()
-    shown = -math.inf
-
-    def note(text: str) -> None:
-        nonlocal shown
-        now = time.monotonic()
-        if terminal:
-            width = shutil.get_terminal_size().columns
-            stream.write(f"\r\x1b[K{_printable(f'{now - start:5.0f} s  {text}')[: width - 1]}")
-            stream.flush()
-        elif now - shown >= _PLAIN_SECONDS:
-            _write(stream, f"{now - start:.0f} s  {text}")
-            shown = now
-
-    try:
-        yield note
-    finally:
-        if terminal:
-            stream.write("\r\x1b[K")
-            stream.flush()
 
 
 def default_out(unit_name: str, verb: str) -> Path:
@@ -109,13 +80,19 @@ def write_json(path: Path | str, obj) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def _make_parents(out: Path) -> list[Path]:
+def require_out(out: Path | str) -> None:
+    """BadInput where ``out`` cannot become a folder, because a file is in the way."""
+    out = Path(os.path.abspath(out))
     if out.exists() and not out.is_dir():
         raise BadInput(out, "a folder to write into", "a file")
-    missing = [folder for folder in out.parents if not folder.exists()]
     with_file = next((folder for folder in out.parents if folder.exists()), None)
     if with_file is not None and not with_file.is_dir():
         raise BadInput(out, "a folder to write into", f"the file '{with_file}' in its path")
+
+
+def _make_parents(out: Path) -> list[Path]:
+    require_out(out)
+    missing = [folder for folder in out.parents if not folder.exists()]
     out.parent.mkdir(parents=True, exist_ok=True)
     return missing
 
@@ -146,9 +123,14 @@ def _plain(obj):
     return str(obj) if isinstance(obj, os.PathLike) else obj
 
 
-def _write(stream, text: str) -> None:
+def in_encoding_of(stream, text: str) -> str:
+    """Text that a stream can write: control characters, and those outside its encoding, are shown and not obeyed."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
-    stream.write(_printable(text).encode(encoding, errors="backslashreplace").decode(encoding) + "\n")
+    return _printable(text).encode(encoding, errors="backslashreplace").decode(encoding)
+
+
+def _write(stream, text: str) -> None:
+    stream.write(in_encoding_of(stream, text) + "\n")
     stream.flush()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,23 +15,36 @@ FIT_FILES = ("posterior.nc", "indicators.json")
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How a unit is fitted; ``seconds`` is the budget of sampling."""
+    """How a unit is fitted; ``seconds`` is the budget of sampling, ``loads`` [N·m] and ``load_rate`` [N·m/s] ask for B."""
 
     baseline: tuple[str, ...] = tuple(BASELINE.split(","))
     k: float = 0.03
     level: float = 0.9
     seconds: float = 120.0
     seed: int = 0
+    loads: tuple[float, ...] = ()
+    load_rate: float | None = None
 
     def __post_init__(self):
+        from backdrive_bayes.model.registry import members_named
+
+        members_named(self.baseline)
         for name, value, top in (("--k", self.k, 1.0), ("--level", self.level, 1.0), ("--budget", self.seconds, 1e7)):
             if not 0 < value < top:
                 raise BadInput(name, f"a number between 0 and {top:g}", value)
+        for load in self.loads:
+            if not math.isfinite(load) or load == 0:
+                raise BadInput("--load", "a torque other than zero [N·m]", load)
+        if self.load_rate is not None and not (self.loads and 0 < self.load_rate < math.inf):
+            found = self.load_rate if self.loads else "no --load"
+            raise BadInput("--load-rate", "a rate above zero [N·m/s] for a --load", found)
 
     @classmethod
     def of(cls, args) -> FitOptions:
         """From a parsed command line."""
-        return cls(tuple(args.baseline.split(",")), args.k, args.level, args.budget, args.seed)
+        loads = tuple(getattr(args, "load", ()))
+        baseline = tuple(args.baseline.split(","))
+        return cls(baseline, args.k, args.level, args.budget, args.seed, loads, getattr(args, "load_rate", None))
 
 
 def add_fit_arguments(parser) -> None:
@@ -58,10 +72,12 @@ def fit_unit(unit, options: FitOptions, note=lambda text: None, resume=None):
     ``resume`` is what chain_file.read_chain found of a fit whose budget ran out.
     """
     from backdrive_bayes.indicators.least_squares import least_squares_json
+    from backdrive_bayes.indicators.loads import loads_json, require_loads
     from backdrive_bayes.indicators.summary import indicators_json, monitored
     from backdrive_bayes.inference.fit import fit
     from backdrive_bayes.inference.sampling import Settings
 
+    require_loads(unit, options.loads)
     posterior = fit(
         unit,
         baseline=options.baseline,
@@ -71,7 +87,10 @@ def fit_unit(unit, options: FitOptions, note=lambda text: None, resume=None):
         resume=resume,
         progress=note,
     )
+    note("indicators and their intervals")
     result = indicators_json(posterior, options.k, options.level)
+    if options.loads:
+        result["loads"] = loads_json(posterior, options.loads, options.load_rate, options.level)
     for record, own in zip(result["records"], unit.records, strict=True):
         record["least_squares"] = least_squares_json(own, unit.rated_torque_nm, options.k)
     result["identity"] = dict(unit.identity)
@@ -92,14 +111,16 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
     return found.json, sampled
 
 
-def keep_fit(posterior, result: dict, folder: Path, figures: bool = True) -> None:
+def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=lambda text: None) -> None:
     """Write indicators.json, posterior.nc and figures into ``folder``."""
     from backdrive_bayes.indicators.draws import indicator_draws
     from backdrive_bayes.inference.posterior_file import write_posterior
 
+    note("draws of the indicators")
     write_json(folder / "indicators.json", result)
     write_posterior(posterior, folder / "posterior.nc", {"indicators": indicator_draws(posterior, result["k"])})
     if figures:
+        note("figures")
         draw_figures("save_figures", folder)
 
 

@@ -61,7 +61,8 @@ def figures_of(saved: Saved) -> dict[str, Figure]:
     out |= _split("torque-energy", torque_energy.draw, saved, everything, PER_FIGURE)
     out |= _split("amplitude", amplitude.draw, saved, everything, len(SERIES))
     if saved.posterior_file:
-        out["corner"] = corner_plot.draw(saved)
+        shared = list(corner_plot.shared_parameters(saved))
+        out |= _split("corner", corner_plot.draw, saved, shared, corner_plot.in_one_figure(len(shared)))
         out["trace"] = trace.draw(saved)
         out |= _split("predictive", predictive.draw, saved, everything, PER_FIGURE)
     return out

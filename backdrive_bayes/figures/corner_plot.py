@@ -8,25 +8,38 @@ import numpy as np
 
 from backdrive_bayes.errors import MissingExtra
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import BLUE, MaxNLocator, display_unit, new_figure, styled, words
+from backdrive_bayes.figures.style import (
+    BLUE,
+    WIDTH_IN,
+    MaxNLocator,
+    display_unit,
+    moved,
+    new_figure,
+    numbers,
+    size_in,
+    styled,
+    two_lines,
+    words,
+)
 
 CAPTION = (
     "Posterior of the parameters that all records share: marginal histograms and pairwise contours that "
     "hold 39 % and 86 % of the draws (one and two standard deviations of a normal)."
 )
-MOST = 12
+MOST = 16
+"""Parameters in one figure; more are spread evenly over several."""
 LEVELS = (0.393, 0.865)
-LABEL_IN = 0.45
-"""Room for tick labels between a panel and its name [inch]."""
+HEIGHT_IN = 6.9
+PAD_IN = 0.06
+TICK_LINE_IN = 0.14
+"""Height of a line of tick labels with the air that it needs."""
 
 
 def shared_parameters(saved: Saved) -> dict[str, tuple[np.ndarray, str]]:
-    """Draws (chains, draws) and unit for display of each parameter that belongs to no single record, at most
-    twelve.
-    """
+    """Draws (chains, draws) and unit for display of each parameter that belongs to no single record."""
     posterior, out = saved.group("posterior"), {}
     for name, about in saved.indicators["parameters"].items():
-        if name in posterior and posterior[name].dims == ("chain", "draw") and len(out) < MOST:
+        if name in posterior and posterior[name].dims == ("chain", "draw"):
             factor, unit = display_unit(about["unit"])
             values = posterior[name].values * factor
             if unit == "N·m" and np.median(np.abs(values)) < 0.1:
@@ -35,13 +48,18 @@ def shared_parameters(saved: Saved) -> dict[str, tuple[np.ndarray, str]]:
     return out
 
 
-def draw(saved: Saved):
-    """Corner plot of at most twelve shared parameters in arcmin, mN·m or N·m."""
+def in_one_figure(parameters: int) -> int:
+    """How many of so many parameters to show in one figure."""
+    return -(-parameters // max(1, -(-parameters // MOST)))
+
+
+def draw(saved: Saved, names: list[str]):
+    """Corner plot of the named shared parameters (at most sixteen) in arcmin, mN·m or N·m."""
     corner = _corner()
-    shown = shared_parameters(saved)
-    n = len(shown)
+    every = shared_parameters(saved)
+    shown, n = {name: every[name] for name in names}, len(names)
     with styled():
-        figure = new_figure(6.9, constrained=False)
+        figure = new_figure(HEIGHT_IN, constrained=False)
         draws = np.stack([v.ravel() for v, _ in shown.values()], axis=1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -58,8 +76,9 @@ def draw(saved: Saved):
                 fill_contours=True,
                 labels=[""] * n,
             )
-        _dress(np.array(figure.axes).reshape(n, n), shown, LABEL_IN * n / 5.2)
-        figure.subplots_adjust(left=0.215, bottom=0.205, right=0.99, top=0.99, wspace=0.08, hspace=0.08)
+        axes = np.array(figure.axes).reshape(n, n)
+        _dress(axes, shown)
+        _arrange(figure, axes)
     return figure
 
 
@@ -79,40 +98,48 @@ def _span(values):
     return lo - margin, hi + margin
 
 
-def _dress(axes, shown, label_at):
-    """Two ticks a panel, and names in words with units at the left of each row and below each column."""
+def _dress(axes, shown):
+    """At most two ticks a panel, and names in words with units at the left of each row and below each column."""
+    line = TICK_LINE_IN * len(axes) / 5.0
     for i, (name, (_, unit)) in enumerate(shown.items()):
-        text = _name(name, unit)
-        axes[-1, i].set_xlabel(text, rotation=90, ha="center", va="top")
-        axes[-1, i].xaxis.set_label_coords(0.5, -label_at)
+        text = two_lines(words(name), f"[{unit or '–'}]")
+        axes[-1, i].set_xlabel(text, rotation=90, ha="center", va="top", ma="right")
         axes[i, 0].set_ylabel(text, rotation=0, ha="right", va="center")
-        axes[i, 0].yaxis.set_label_coords(-label_at if i else -0.1, 0.5)
         for j, panel in enumerate(axes[i, : i + 1]):
             panel.tick_params(length=2, pad=1.5)
-            panel.tick_params(axis="x", labelrotation=90)
-            panel.tick_params(axis="y", labelrotation=0)
-            panel.set_xticks(_inner_ticks(*panel.get_xlim()))
-            for label in (*panel.get_xticklabels(), *panel.get_yticklabels()):
-                label.set(
-                    ha="right" if label in panel.get_yticklabels() else "center", rotation_mode="default"
-                )
+            _ticks(panel.set_xticks, *panel.get_xlim(), line, i == len(axes) - 1)
             if j < i:
-                panel.set_yticks(_inner_ticks(*panel.get_ylim()))
+                _ticks(panel.set_yticks, *panel.get_ylim(), line, j == 0)
+            for label in panel.get_xticklabels():
+                label.set(rotation=90, ha="right", va="center", rotation_mode="anchor")
+            for label in panel.get_yticklabels():
+                label.set(rotation=0, ha="right", va="center")
 
 
-def _inner_ticks(lo, hi):
-    """Two round values well inside a panel, so that labels of neighbours do not meet."""
-    margin = 0.12 * (hi - lo)
-    for n in range(2, 9):
+def _ticks(put, lo, hi, line, labelled):
+    at = _inner_ticks(lo, hi, line)
+    put(at, numbers(at) if labelled else [""] * len(at))
+
+
+def _inner_ticks(lo, hi, line):
+    """Two round values well inside a panel, a line of text apart, or one: labels must not meet; ``line`` is a share of it."""
+    inside = np.array([])
+    for n in range(2, 13):
         ticks = MaxNLocator(n, steps=[1, 2, 5, 10]).tick_values(lo, hi)
-        inside = ticks[(ticks > lo + margin) & (ticks < hi - margin)]
-        if inside.size >= 2:
-            break
-    return inside[[0, -1]]
+        inside = ticks[(ticks > lo + 0.5 * line * (hi - lo)) & (ticks < hi - 0.5 * line * (hi - lo))]
+        if inside.size >= 2 and inside[-1] - inside[0] >= line * (hi - lo):
+            return inside[[0, -1]]
+    return inside[inside.size // 2 :][:1]
 
 
-def _name(name, unit):
-    """Two lines, which is what fits beside a panel; the unit closes the second."""
-    *first, last = words(name).split(" ")
-    unit = f"[{unit or '–'}]"
-    return f"{' '.join(first)}\n{last} {unit}" if first else f"{last}\n{unit}"
+def _arrange(figure, axes):
+    """Names beside the longest tick label, and margins that hold both."""
+    ticks_x = max((size_in(t)[1] for panel in axes[-1] for t in panel.get_xticklabels()), default=0.0) + 2 * PAD_IN
+    ticks_y = max((size_in(t)[0] for panel in axes[:, 0] for t in panel.get_yticklabels()), default=0.0) + 2 * PAD_IN
+    for panel in axes[-1]:
+        panel.xaxis.set_label_coords(0.5, 0, moved(panel, 0, -ticks_x))
+    for panel in axes[:, 0]:
+        panel.yaxis.set_label_coords(0, 0.5, moved(panel, -ticks_y, 0))
+    left = ticks_y + max(size_in(panel.yaxis.label)[0] for panel in axes[:, 0]) + PAD_IN
+    bottom = ticks_x + max(size_in(panel.xaxis.label)[1] for panel in axes[-1]) + PAD_IN
+    figure.subplots_adjust(left / WIDTH_IN, bottom / HEIGHT_IN, 0.99, 0.99, wspace=0.08, hspace=0.08)

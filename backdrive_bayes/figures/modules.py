@@ -21,6 +21,8 @@ CAPTION = (
     "minus the sum of the modules. Panels share the loop's angle scale unless they say otherwise."
 )
 COLUMNS = 3
+LETTERS = 15
+"""Longer names leave no room for more beside them."""
 LEGIBLE = 0.1
 """Panels that span less than this share of the loop's range get a scale of their own."""
 ALIKE = 0.01
@@ -69,7 +71,7 @@ def draw(saved: Saved, records: list[int]):
             panel.tick_params(labelbottom=True)
             panel.set_xlabel("torque [N·m]")
         _scales(axes, curves)
-        _label(axes, len(curves))
+        _label(figure, axes, len(curves))
         figure.suptitle(f"record {record_labels(saved.records)[records[0]]}", fontsize=8.5)
     return figure
 
@@ -88,12 +90,13 @@ def _scales(axes, curves):
     whole = max(np.ptp(curves[0][1]), np.ptp(curves[0][2]))
     for panel, (name, *branches) in zip(axes, curves, strict=False):
         if max(np.ptp(b) for b in branches) < LEGIBLE * whole:
-            panel.set_title(f"{name} (own scale)")
+            gap = " " if len(name) <= LETTERS else "\n"
+            panel.set_title(f"{name}{gap}(own scale)")
         else:
             panel.set_ylim(axes[0].get_ylim())
 
 
-def _label(axes, used):
+def _label(figure, axes, used):
     for i, panel in enumerate(axes):
         if i >= used:
             panel.set_axis_off()
@@ -103,4 +106,4 @@ def _label(axes, used):
     if used < len(axes):
         axes[-1].legend(handles, names, loc="center")
     else:
-        axes[0].legend(handles, names, loc="upper left")
+        figure.legend(handles, names, loc="outside lower center", ncols=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 import warnings
 from contextlib import contextmanager
 
@@ -15,6 +16,7 @@ try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
         from matplotlib.ticker import MaxNLocator
+        from matplotlib.transforms import ScaledTranslation
 except ImportError:
     raise MissingExtra("drawing figures", "matplotlib", "figures") from None
 
@@ -144,3 +146,35 @@ def indicator_words(name: str) -> str:
 def words(name: str) -> str:
     """A parameter's or module's name in words."""
     return name.replace("_", " ")
+
+
+def two_lines(text: str, unit: str) -> str:
+    """Text and unit on two lines, broken where the longer line is shortest."""
+    parts = [*text.split(" "), unit]
+    breaks = [(" ".join(parts[:i]), " ".join(parts[i:])) for i in range(1, len(parts))]
+    return "\n".join(min(breaks, key=lambda lines: max(map(len, lines))))
+
+
+def wrapped(text: str, width: int) -> str:
+    """Text on as many lines as lines of ``width`` characters take; words stay whole."""
+    return textwrap.fill(text, width, break_long_words=False, break_on_hyphens=False)
+
+
+def numbers(values) -> list[str]:
+    """Ticks' values in full, alike in their decimals, without a common factor or offset elsewhere."""
+    shown = [f"{v:.10g}" for v in values]
+    if not any("e" in text for text in shown):
+        decimals = max((len(text.partition(".")[2]) for text in shown), default=0)
+        shown = [f"{v:.{decimals}f}" for v in values]
+    return [text.replace("-", "−") for text in shown]
+
+
+def size_in(text) -> tuple[float, float]:
+    """Width and height of a text of a figure as it will be drawn [inch]."""
+    box = text.get_window_extent(text.figure.canvas.get_renderer())
+    return box.width / text.figure.dpi, box.height / text.figure.dpi
+
+
+def moved(axes, right_in: float, up_in: float):
+    """The axes' own coordinates, moved by so many inches."""
+    return axes.transAxes + ScaledTranslation(right_in, up_in, axes.figure.dpi_scale_trans)

@@ -44,7 +44,8 @@ def _tau(saved, record):
 
 def _curve(axes, saved, record, zoomed):
     curve = saved.records[record]["torque_energy"]
-    torque, end = np.asarray(curve["torque_Nm"]), saved.records[record]["amplitude_Nm"]
+    # Amplitudes that agree to three digits get the same scale and ticks.
+    torque, end = np.asarray(curve["torque_Nm"]), float(f"{saved.records[record]['amplitude_Nm']:.3g}")
     tau1, tau2 = _tau(saved, record)
     lo, hi, median = (np.asarray(curve[k]) * MJ_PER_J for k in ("lo", "hi", "median_J_per_Nm"))
     edges = (0.0, tau1, tau2, end)
@@ -52,12 +53,11 @@ def _curve(axes, saved, record, zoomed):
         axes.axvspan(
             a, b, facecolor=colour, hatch=hatch, edgecolor="white", linewidth=0, alpha=0.8, label=name
         )
-    axes.fill_between(torque, lo, hi, color=BLUE, alpha=0.4, linewidth=0)
-    axes.plot(
-        torque, median, color=BLUE, label=f"median and {100 * saved.indicators['level']:.3g} % interval"
-    )
+    band = f"{100 * saved.indicators['level']:.3g} % interval"
+    axes.fill_between(torque, lo, hi, color=BLUE, alpha=0.4, linewidth=0, label=band)
+    axes.plot(torque, median, color=BLUE, label="median")
     axes.axvline(tau1, color=BLACK, linestyle=(0, (1, 1.2)), linewidth=1, label="τ₁")
     axes.axvline(tau2, color=BLACK, linestyle=(0, (5, 2)), linewidth=1, label="τ₂")
     axes.set_xlim(0, min(end, ZOOM_TAU2 * tau2) if zoomed else end)
     axes.set_ylim(0, None)
-    few_ticks(axes)
+    few_ticks(axes, 3 if zoomed else 2)

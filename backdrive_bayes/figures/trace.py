@@ -6,7 +6,7 @@ import numpy as np
 
 from backdrive_bayes.figures.corner_plot import shared_parameters
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import GREY, SERIES, few_ticks, new_figure, styled, words
+from backdrive_bayes.figures.style import GREY, SERIES, few_ticks, new_figure, styled, words, wrapped
 
 CAPTION = (
     "Sampling. Rank histograms: ranks of each ensemble's draws among all draws, as counts over the even "
@@ -15,6 +15,8 @@ CAPTION = (
 )
 BINS = 16
 COLUMNS = 6
+LETTERS = 12
+"""What fits above a panel."""
 
 
 def draw(saved: Saved):
@@ -22,14 +24,14 @@ def draw(saved: Saved):
     shown = shared_parameters(saved)
     rows = -(-len(shown) // COLUMNS)
     with styled():
-        figure = new_figure(1.75 + 1.0 * rows)
+        figure = new_figure(1.75 + 1.15 * rows)
         grid = figure.add_gridspec(rows + 1, COLUMNS, height_ratios=[*[1.0] * rows, 1.35])
         first = None
         for i, (name, (values, _)) in enumerate(shown.items()):
             panel = figure.add_subplot(grid[i // COLUMNS, i % COLUMNS], sharey=first)
             first = first or panel
             _ranks(panel, values)
-            panel.set_title(words(name).replace(" ", "\n", 1), pad=3, fontsize=8)
+            panel.set_title(wrapped(words(name), LETTERS), pad=3, fontsize=8)
             panel.tick_params(labelleft=i % COLUMNS == 0, labelbottom=i + COLUMNS >= len(shown))
             if i % COLUMNS == 0:
                 panel.set_ylabel("count /\neven share")

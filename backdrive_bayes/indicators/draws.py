@@ -6,13 +6,13 @@ import numpy as np
 
 from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators.loop import (
-    Loops,
     discrepancy_loops,
     model_loops,
     module_loops,
     record_amplitude_nm,
     torque_grid,
 )
+from backdrive_bayes.indicators.other_loops import OtherLoops
 from backdrive_bayes.indicators.summary import core_indicators, loading_rate_nm_per_s
 from backdrive_bayes.inference.fit import Posterior
 
@@ -129,21 +129,11 @@ def _mechanism(posterior, record, torque, full):
 
 
 def _smaller(posterior, record, lost_motion_torque, kept):
-    """Core indicators (kept, positions) of loops of smaller amplitude: the model's, with the model error scaled down.
-
-    The model error is that of the measured loop, squeezed to the smaller one in torque and, with the peak, in angle.
-    """
-    problem, z, weights = posterior.problem, posterior.z[kept], posterior.weights[kept]
-    amplitude = record_amplitude_nm(problem, record)
-    largest = ind.peak_angle_rad(model_loops(problem, z, record, torque_grid(amplitude)))
+    """Core indicators (kept, positions) of loops of smaller amplitude: the model's, with the model error scaled down."""
+    other = OtherLoops(posterior, record, kept)
     found: dict[str, list] = {name: [] for name in CORE}
-    for t in amplitude * np.arange(1, POSITIONS + 1) / POSITIONS:
-        loops = model_loops(problem, z, record, torque_grid(t, (lost_motion_torque,)))
-        if posterior.discrepancy.present:
-            spread = discrepancy_loops(problem, posterior.discrepancy, weights, record, loops.torque_nm * amplitude / t)
-            share = (ind.peak_angle_rad(loops) / largest)[:, None]
-            loops = loops + Loops(loops.torque_nm, spread.rising * share, spread.falling * share)
-        for name, values in core_indicators(loops, lost_motion_torque).items():
+    for t in other.amplitude_nm * np.arange(1, POSITIONS + 1) / POSITIONS:
+        for name, values in core_indicators(other.of(t, (lost_motion_torque,)), lost_motion_torque).items():
             found[name].append(values)
     return {name: np.stack(values, axis=1) for name, values in found.items()}
 

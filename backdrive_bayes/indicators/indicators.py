@@ -15,12 +15,12 @@ def lost_motion_rad(loops: Loops, torque_nm: float) -> np.ndarray:
     if torque_nm > loops.torque_nm[-1]:
         return np.full(loops.rising.shape[0], np.nan)
     mean = 0.5 * (loops.rising + loops.falling)
-    return _at(loops, mean, torque_nm) - _at(loops, mean, -torque_nm)
+    return loops.at(mean, torque_nm) - loops.at(mean, -torque_nm)
 
 
 def zero_torque_width_rad(loops: Loops) -> np.ndarray:
     """w(0), what most people call backlash [rad], shape (draws,)."""
-    return _at(loops, loops.width, 0.0)
+    return loops.at(loops.width, 0.0)
 
 
 def peak_angle_rad(loops: Loops) -> np.ndarray:
@@ -89,20 +89,17 @@ def _crossing(torque, curve, left, level):
 
 
 def back_drive(loops: Loops, load_nm: float):
-    """B = (θ_L [rad], W_L [J]): angle turned and energy absorbed when a load arrives on the rising branch at zero torque.
+    """B = (θ_L [rad], W_L [J]): angle turned and energy absorbed when a load arrives at zero torque of a settled loop.
 
-    Shapes (draws,). Source: eq. (1) and (7), reconstructed.
+    The load runs along the branch that leads to it: the rising one, or for a negative load, whose angle is negative, the
+    falling one. Shapes (draws,). Source: eq. (1) and (7), reconstructed.
     """
+    if load_nm < 0:
+        angle, energy = back_drive(loops.mirrored, -load_nm)
+        return -angle, energy
     load = min(load_nm, float(loops.torque_nm[-1]))
-    angle = _at(loops, loops.rising, load) - _at(loops, loops.rising, 0.0)
+    angle = loops.at(loops.rising, load) - loops.at(loops.rising, 0.0)
     within = (loops.torque_nm >= 0) & (loops.torque_nm < load)
     torque = np.append(loops.torque_nm[within], load)
-    rising = np.column_stack([loops.rising[:, within], _at(loops, loops.rising, load)])
+    rising = np.column_stack([loops.rising[:, within], loops.at(loops.rising, load)])
     return angle, np.diff(rising, axis=1) @ (0.5 * (torque[1:] + torque[:-1]))
-
-
-def _at(loops, curve, torque):
-    index = int(np.clip(np.searchsorted(loops.torque_nm, torque), 1, loops.torque_nm.size - 1))
-    low, high = loops.torque_nm[index - 1], loops.torque_nm[index]
-    share = (torque - low) / (high - low)
-    return (1 - share) * curve[:, index - 1] + share * curve[:, index]

@@ -26,8 +26,29 @@ class Loops:
         """w(τ) = θ₋ − θ₊ [rad], shape (draws, points)."""
         return self.falling - self.rising
 
+    @property
+    def mirrored(self) -> Loops:
+        """The same loops with torque and angle of the other sign."""
+        return Loops(-self.torque_nm[::-1], -self.falling[:, ::-1], -self.rising[:, ::-1])
+
     def __add__(self, other: Loops) -> Loops:
         return Loops(self.torque_nm, self.rising + other.rising, self.falling + other.falling)
+
+    def at(self, curve: np.ndarray, torque_nm: float) -> np.ndarray:
+        """A curve (draws, points) over these torques at one of them, shape (draws,); linear between points."""
+        index = int(np.clip(np.searchsorted(self.torque_nm, torque_nm), 1, self.torque_nm.size - 1))
+        low, high = self.torque_nm[index - 1], self.torque_nm[index]
+        share = (torque_nm - low) / (high - low)
+        return (1 - share) * curve[:, index - 1] + share * curve[:, index]
+
+    def within(self, torque_nm: float) -> Loops:
+        """The window |τ| ≤ ``torque_nm`` cut out of these loops; its branches need not meet at its ends."""
+        inside = np.abs(self.torque_nm) < torque_nm
+        torque = np.concatenate([[-torque_nm], self.torque_nm[inside], [torque_nm]])
+        return Loops(torque, *(self._cut_to(curve, inside, torque_nm) for curve in (self.rising, self.falling)))
+
+    def _cut_to(self, curve, inside, torque_nm):
+        return np.column_stack([self.at(curve, -torque_nm), curve[:, inside], self.at(curve, torque_nm)])
 
 
 def torque_grid(amplitude: float, exact=()) -> np.ndarray:
@@ -40,9 +61,9 @@ def torque_grid(amplitude: float, exact=()) -> np.ndarray:
     return np.concatenate([-half[:0:-1], half])
 
 
-def model_loops(problem: Problem, z, record: int, torque) -> Loops:
-    """The reducer's settled loops on ``torque`` (points,) at the record's rate for draws ``z`` (draws, dimension)."""
-    path, reducer = settled_path(torque, problem.loading_rate_nm_per_s(record)), problem.model.reducer
+def model_loops(problem: Problem, z, record: int, torque, rate_nm_per_s: float | None = None) -> Loops:
+    """The reducer's settled loops on ``torque`` (points,) for draws ``z`` (draws, dimension), by default at the record's rate."""
+    path, reducer = settled_path(torque, rate_nm_per_s or problem.loading_rate_nm_per_s(record)), problem.model.reducer
     return _cut(torque, _in_chunks(lambda v: reducer.angle(v, path), problem, z, record))
 
 
@@ -57,7 +78,7 @@ def module_loops(problem: Problem, z, record: int, torque) -> dict[str, Loops]:
 
 
 def discrepancy_loops(problem: Problem, discrepancy: Discrepancy, weights, record: int, torque) -> Loops:
-    """The discrepancy on the same loops for coefficients ``weights`` (draws, terms)."""
+    """The discrepancy on the record's own loops for coefficients ``weights`` (draws, terms)."""
     path = settled_path(torque, problem.loading_rate_nm_per_s(record))
     basis = discrepancy.basis_on(problem, record, path, model=problem.model.reducer)
     return _cut(torque, weights @ basis.T)

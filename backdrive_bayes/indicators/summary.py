@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.indicators import indicators as ind
+from backdrive_bayes.indicators.intervals import LEVEL, interval, over_positions
 from backdrive_bayes.indicators.loop import (
     Loops,
     discrepancy_loops,
@@ -13,12 +14,12 @@ from backdrive_bayes.indicators.loop import (
     record_amplitude_nm,
     torque_grid,
 )
+from backdrive_bayes.indicators.other_loops import OtherLoops, some_draws
 from backdrive_bayes.inference.discrepancy import Discrepancy
 from backdrive_bayes.inference.fit import Posterior
 from backdrive_bayes.inference.problem import Problem
 from backdrive_bayes.results import INDICATORS
 
-LEVEL = 0.9
 POSITIONS = 10
 POSITION_DRAWS = 500
 
@@ -60,14 +61,6 @@ def reducer_loops(problem, discrepancy, z, weights, record, k) -> Loops:
 
 def _rated(problem):
     return problem.model.scale.torque_nm
-
-
-def interval(values, level: float = LEVEL) -> dict | None:
-    """Median and central interval of ``values`` (draws,); None where the quantity is not defined."""
-    if np.isnan(values).all():
-        return None
-    lo, median, hi = np.quantile(values, [0.5 - level / 2, 0.5, 0.5 + level / 2])
-    return {"median": float(median), "lo": float(lo), "hi": float(hi)}
 
 
 def indicators_json(posterior: Posterior, k: float, level: float = LEVEL) -> dict:
@@ -132,6 +125,7 @@ def _record_json(posterior, record, k, level):
             "tau2_Nm": interval(tau2, level),
         },
         "by_amplitude": _by_amplitude_json(posterior, record, level),
+        "windowed": _windowed_json(full, level),
         "back_drive": _back_drive_json(full, _rated(problem), level),
         "noise": _noise_json(data.noise),
     }
@@ -181,27 +175,23 @@ def _mechanism_json(posterior, record, torque, full, level):
 
 def _by_amplitude_json(posterior, record, level):
     """S(t) and u(t) of loops of amplitude t, model predictions with the discrepancy's prior spread, and their extremes."""
-    problem = posterior.problem
-    amplitude = record_amplitude_nm(problem, record)
-    pick = np.linspace(0, len(posterior.z) - 1, min(POSITION_DRAWS, len(posterior.z))).astype(int)
-    z, weights = posterior.z[pick], posterior.weights[pick]
-    amplitudes = amplitude * np.arange(1, POSITIONS + 1) / POSITIONS
-    area, ratio = np.empty((2, POSITIONS, pick.size))
-    for i, t in enumerate(amplitudes):
-        loops = model_loops(problem, z, record, torque_grid(t))
-        if posterior.discrepancy.present:
-            spread = discrepancy_loops(problem, posterior.discrepancy, weights, record, loops.torque_nm * amplitude / t)
-            share = ind.peak_angle_rad(loops) / ind.peak_angle_rad(model_loops(problem, z, record, torque_grid(amplitude)))
-            loops = loops + Loops(loops.torque_nm, spread.rising * share[:, None], spread.falling * share[:, None])
-        area[i], ratio[i] = ind.loop_area_j(loops), ind.dissipation_ratio(loops)
-    return {
-        "amplitude_Nm": amplitudes.tolist(),
-        "loop_area_J": [interval(v, level) for v in area],
-        "dissipation_ratio": [interval(v, level) for v in ratio],
-        **{f"{name}_{key}": interval(f(v, axis=0), level)
-           for key, v in (("S_J", area), ("u", ratio))
-           for name, f in (("max", np.max), ("min", np.min), ("mean", np.mean))},
-    }
+    other = OtherLoops(posterior, record, some_draws(posterior, POSITION_DRAWS))
+    amplitudes = _positions(other.amplitude_nm)
+    loops = [other.of(t) for t in amplitudes]
+    values = (np.stack([f(x) for x in loops]) for f in (ind.loop_area_j, ind.dissipation_ratio))
+    return {"amplitude_Nm": amplitudes.tolist(), **over_positions(*values, level)}
+
+
+def _windowed_json(full, level):
+    """The same of windows |τ| ≤ t cut out of the measured loop; this u(t) may exceed 1, for a window is no closed loop."""
+    torque = _positions(full.torque_nm[-1])
+    windows = [full.within(t) for t in torque]
+    values = (np.stack([f(x) for x in windows]) for f in (ind.loop_area_j, ind.dissipation_ratio))
+    return {"torque_Nm": torque.tolist(), **over_positions(*values, level)}
+
+
+def _positions(amplitude):
+    return amplitude * np.arange(1, POSITIONS + 1) / POSITIONS
 
 
 def _back_drive_json(full, rated, level):

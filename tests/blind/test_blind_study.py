@@ -97,8 +97,9 @@ def test_what_raises_or_dies_is_counted_and_an_interrupted_check_goes_on(tmp_pat
     class Interrupted(Exception):
         pass
 
-    def stop(text):
+    def stop(text, share):
         if "diagnosed 1 of" in text:
+            assert 0 < share < 1
             raise Interrupted
 
     with pytest.raises(Interrupted):

@@ -1,18 +1,22 @@
 """Figures draw from saved results alone, carry units and do not overlap."""
 
 import hashlib
+import json
+import re
 import subprocess
 import sys
 from itertools import combinations
 
 import numpy as np
 import pytest
+import xarray
 from support_results import write_result
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.figures import catalogue, loop
 from backdrive_bayes.figures.saved import Saved, record_blocks
-from backdrive_bayes.figures.style import record_labels, styled
+from backdrive_bayes.figures.style import numbers, record_labels, styled, words
+from backdrive_bayes.model.registry import BASELINE, candidates_beside, members_named
 
 NAMES = ["loop", "modules", "torque-energy", "amplitude", "corner", "trace", "predictive"]
 
@@ -60,8 +64,13 @@ def test_every_figure_is_drawn_and_has_a_caption(figures):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_text_overlaps_or_leaves_the_figure(figures, name):
-    shown = texts(figures[name])
-    frame = figures[name].bbox
+    assert_readable(figures[name])
+
+
+def assert_readable(figure):
+    """No text is cut, overlaps another or is set below eight points."""
+    shown, frame = texts(figure), figure.bbox
+    assert min(text.get_size() for text, _ in shown) >= 8
     for text, box in shown:
         inside = (
             box.x0 >= frame.x0 - 1
@@ -74,11 +83,6 @@ def test_no_text_overlaps_or_leaves_the_figure(figures, name):
         wide = min(box_a.x1, box_b.x1) - max(box_a.x0, box_b.x0)
         high = min(box_a.y1, box_b.y1) - max(box_a.y0, box_b.y0)
         assert wide < 1 or high < 1, f"'{a.get_text()}' and '{b.get_text()}' overlap"
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_no_text_is_below_eight_points(figures, name):
-    assert min(text.get_size() for text, _ in texts(figures[name])) >= 8
 
 
 @pytest.mark.parametrize(
@@ -95,6 +99,58 @@ def test_no_text_is_below_eight_points(figures, name):
 def test_axes_carry_units(figures, name, units):
     labels = " ".join(text.get_text() for text, _ in texts(figures[name]))
     assert all(unit in labels for unit in units)
+
+
+SIZES = {"rad": 3.1e-8, "rad/(N·m)": 2.21234567, "N·m": 0.0045, "1": 0.4998765, "s": 1234.5678}
+"""A value for every unit of a parameter: tiny, huge, or close to a round number."""
+
+
+@pytest.fixture(scope="module")
+def crowded(tmp_path_factory):
+    """All that a diagnosed model may hold: every parameter and module there is, in six records of one rate."""
+    path = tmp_path_factory.mktemp("crowded")
+    members = members_named((*BASELINE, *candidates_beside(BASELINE)))
+    shared = {p.name: (p.unit, SIZES[p.unit]) for m in members for p in m.parameters if not p.per_record}
+    result = write_result(path, records=6, shared=shared)
+    for i, record in enumerate(result["records"]):
+        record["loading_rate_Nm_per_s"] = 0.05
+        elastic = record["modules"]["elastic"]
+        small = {k: [1e-3 * v for v in values] for k, values in elastic.items()}
+        record["modules"] = {m.name: elastic if j < 2 else small for j, m in enumerate(members[: 13 if i == 0 else 4])}
+    (path / "indicators.json").write_text(json.dumps(result))
+    return path, list(shared), catalogue.all_figures(path)
+
+
+def test_every_parameter_and_module_is_shown_readably(crowded):
+    _, names, drawn = crowded
+    assert {"corner", "corner-2", "corner-3", "modules-2", "loop-2"} <= set(drawn)
+    for figure in drawn.values():
+        assert_readable(figure)
+    corners = [t.get_text() for n, f in drawn.items() if n.startswith("corner") for t, _ in texts(f)]
+    traced = [t.get_text() for t, _ in texts(drawn["trace"])]
+    for name in names:
+        labels = [text for text in corners if text.replace("\n", " ").startswith(f"{words(name)} [")]
+        assert len(labels) == 2, f"{name} is named at its row and at its column, with its unit"
+        assert words(name) in [text.replace("\n", " ") for text in traced]
+
+
+def test_a_corner_plot_of_narrow_posteriors_is_readable(tmp_path):
+    """Tick labels of many digits stay beside the names."""
+    shared = {f"parameter_{i}": ("rad/(N·m)", 2.21234567 * 10**i) for i in range(-3, 4)}
+    write_result(tmp_path, records=1, shared=shared)
+    with xarray.open_dataset(tmp_path / "posterior.nc", group="posterior", engine="h5netcdf") as data:
+        narrow = {n: data[n].mean() * (data[n] / data[n].mean()) ** 1e-4 for n in shared}
+        data = data.load().assign(narrow)
+    data.to_netcdf(tmp_path / "posterior.nc", mode="a", group="posterior", engine="h5netcdf")
+    figure = catalogue.all_figures(tmp_path)["corner"]
+    assert_readable(figure)
+    ticks = [t.get_text() for t, _ in texts(figure) if re.fullmatch(r"[\d.]+", t.get_text())]
+    assert max(map(len, ticks)) >= 7
+
+
+def test_ticks_are_alike_in_their_decimals():
+    assert numbers([0.11, 0.115]) == ["0.110", "0.115"] and numbers([20.0, 40.0]) == ["20", "40"]
+    assert numbers([-3e-5, 3e-5]) == ["−3e−05", "3e−05"]
 
 
 def test_loop_shows_first_loading_apart_from_the_settled_loop(figures):

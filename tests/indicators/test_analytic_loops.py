@@ -140,6 +140,38 @@ def test_back_drive_energy_of_any_load():
     np.testing.assert_allclose(energy, A * 0.093**2 / 2, rtol=1e-3)
 
 
+def test_back_drive_by_a_negative_load_runs_down_the_falling_branch():
+    torque = torque_grid(T, (0.06,))
+    bow = HEIGHT * np.sqrt(1 - (torque / T) ** 2)
+    lopsided = Loops(torque, SLOPE * torque - 2 * bow, SLOPE * torque + bow)
+    angle, energy = ind.back_drive(lopsided, -0.06)
+    np.testing.assert_allclose(angle, -(A * 0.06 + B * (1 - 0.8)), rtol=1e-3)
+    other = ind.back_drive(Loops(torque, SLOPE * torque - bow, SLOPE * torque + bow), 0.06)[1]
+    np.testing.assert_allclose(energy, other, rtol=1e-12)
+    assert (energy < ind.back_drive(lopsided, 0.06)[1]).all(), "the branches differ"
+
+
+@pytest.mark.parametrize("share", [0.013, 0.4, 1.0])
+def test_a_window_cuts_area_and_absorbed_energy_out_of_the_loop(share):
+    t, x = share * T, share
+    area = ind.loop_area_j(KNOWN["ellipse"][0].within(t))
+    np.testing.assert_allclose(area, 2 * B * T * (x * np.sqrt(1 - x**2) + np.arcsin(x)), rtol=1e-3)
+    window = KNOWN["parallelogram"][0].within(t)
+    np.testing.assert_allclose(ind.loop_area_j(window), 4 * H * t, rtol=1e-9)
+    np.testing.assert_allclose(ind.absorbed_j(window), A * t**2, rtol=1e-9)
+    np.testing.assert_allclose(ind.dissipation_ratio(window), 4 * H / (A * t), rtol=1e-9)
+
+
+def test_the_largest_window_is_the_loop_and_windows_are_sums_of_strips():
+    coarse = ellipse(HEIGHT, torque_grid(T))
+    for f in (ind.loop_area_j, ind.absorbed_j):
+        np.testing.assert_allclose(f(coarse.within(T)), f(coarse), rtol=1e-12)
+    torque, strips = ind.torque_energy(coarse)
+    inner, outer = torque[20], torque[50]
+    between = ind.loop_area_j(coarse.within(outer)) - ind.loop_area_j(coarse.within(inner))
+    np.testing.assert_allclose(between, 2 * np.trapezoid(strips[:, 20:51], torque[20:51], axis=1), rtol=1e-9)
+
+
 def test_indicators_of_eq_20_are_its_closed_forms():
     p = PublishedLoop(0.004, 0.21, 3.0, 40.0, 0.006, 130.0, 0.9, 5e-4)
     loops = Loops(FINE, p.angle_rad(FINE, 1)[None], p.angle_rad(FINE, -1)[None])

@@ -62,6 +62,11 @@ def test_the_parts_agree(result, record):
     split = r["mechanism"]
     assert split["S_g_over_S"]["median"] + split["S_f_over_S"]["median"] == pytest.approx(1, abs=0.1)
     assert r["torque_energy"]["tau1_Nm"]["median"] <= r["torque_energy"]["tau2_Nm"]["median"]
+    window = r["windowed"]
+    assert window["torque_Nm"] == pytest.approx(r["by_amplitude"]["amplitude_Nm"])
+    for name in ("loop_area_J", "dissipation_ratio"):
+        assert window[name][-1]["median"] == pytest.approx(core[name]["median"], rel=1e-6)
+    assert window["max_S_J"] == window["loop_area_J"][-1] and window["min_S_J"]["hi"] < window["mean_S_J"]["lo"]
     assert r["loading_rate_Nm_per_s"] == pytest.approx(0.05, rel=0.02)
     assert r["amplitude_Nm"] == pytest.approx((1.0, 0.5)[record] * RATED, rel=0.01)
 
