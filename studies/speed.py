@@ -187,11 +187,13 @@ def _jax_potential(problem):
         ratio, knee = v["hardening_ratio"], v["hardening_torque"]
         elastic = v["compliance"] * (ratio * passed + (1 - ratio) * knee * jnp.tanh(passed / knee))
         drag, release = v["drag_torque"], v["release_torque"]
-        release = drag * release / (drag + release)
+        release = v["release_width_ratio"] * drag * release / (drag + release)
 
         def rising(x):
-            e = v["release_share"]
-            return (1 - e) * jnp.tanh((x - drag) / v["engagement_torque"]) + e * jnp.tanh((x + release) / v["engagement_torque"])
+            e, late = v["release_share"], v["late_share"]
+            early, second = (jnp.tanh((x - d) / v["engagement_torque"]) for d in (drag, drag * v["late_drag_ratio"]))
+            back = jnp.tanh((x + release) / (v["release_width_ratio"] * v["engagement_torque"]))
+            return (1 - e) * ((1 - late) * early + late * second) + e * back
 
         bound = rising(direction * torque) * direction
         low, high = rising(path.start_torque_nm), -rising(-path.start_torque_nm)

@@ -8,7 +8,6 @@ from scipy.linalg import solve_triangular
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
 
-
 BEND_ERROR = 0.3
 """Relative standard error of the correction for the curve's bend within a block: it was made at one mode, of one past."""
 

@@ -64,6 +64,7 @@ def _features(problem) -> dict[str, float]:
         "drag_torque": drag,
         "engagement_torque": 0.5 * clearance / max(float(slope[inner].max()), compliance),
         "release_torque": drag,
+        "late_share": 0.1,
         "compliance": compliance,
         "hardening_torque": 0.5 * amplitude,
         "friction_torque": max(0.5 * at[beyond] / compliance, 1e-3 * amplitude),

@@ -14,9 +14,10 @@ CATALOGUE = "weakly informative; clearance, drag and engagement of small planeta
 class Geometric:
     """Play-like operator whose boundaries are the engagement curves of the two flanks.
 
-    The rising boundary is (c/2)[(1-e) tanh((τ-τ_d)/s) + e tanh((τ+τ_e)/s)], the falling one its mirror image. With e = 0 and
-    a saturated loop these are the branches A tanh(Bτ ∓ D) of eq. (20), reconstructed, with A = c/2, B = 1/s,
-    D = τ_d/s. The share e of the clearance springs back already when the torque has fallen to τ_e. The initial position runs from
+    The rising boundary is (c/2)[(1-e)(1-l) f(τ-τ_d) + (1-e) l f(τ-ρτ_d) + e tanh((τ+τ_e)/s_e)] with f(x) = tanh(x/s), the falling
+    one its mirror image. With e = l = 0 and a saturated loop these are the branches A tanh(Bτ ∓ D) of eq. (20), reconstructed,
+    with A = c/2, B = 1/s, D = τ_d/s. The share l engages late, at ρ times the drag torque (stages in series). The share e of the
+    clearance springs back already when the torque has fallen to τ_e, over a narrower s_e. The initial position runs from
     -1 to 1 between the boundaries at the first torque; teeth that share the clearance may have been left at different places: the
     share ``initial_gap_spread`` of them lies at the one flank or the other so as to give the same mean position.
     """
@@ -29,21 +30,26 @@ class Geometric:
         Parameter("clearance", "rad", "angle", LogNormal(0.3, 1.5), 0.0, CATALOGUE),
         Parameter("drag_torque", "N·m", "torque", LogNormal(0.03, 1.0), None, CATALOGUE),
         Parameter("engagement_torque", "N·m", "torque", LogNormal(0.01, 1.0), None, CATALOGUE),
+        Parameter("late_share", "1", "none", Uniform(0.0, 0.5), None, "no preference"),
+        Parameter("late_drag_ratio", "1", "none", Uniform(1.0, 2.0), None, "a drag of the same kind"),
         Parameter("release_share", "1", "none", Uniform(0.0, 0.5), None, "no preference"),
         Parameter("release_torque", "N·m", "torque", LogNormal(0.02, 1.0), None, CATALOGUE),
+        Parameter("release_width_ratio", "1", "none", Uniform(0.2, 1.0), None, "no wider than the step itself"),
         Parameter("initial_gap_position", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
         Parameter("initial_gap_spread", "1", "none", Uniform(0.0, 1.0), None, "the unit's past is unknown", True),
     )
 
     def respond(self, values, drive):
         """Angle [rad] of shape (…, samples)."""
-        drag, width = values["drag_torque"], values["engagement_torque"]
-        share, release = values["release_share"], values["release_torque"]
-        release = drag * release / (drag + release)
+        drag, width, late = values["drag_torque"], values["engagement_torque"], values["late_share"]
+        share, release, narrow = values["release_share"], values["release_torque"], values["release_width_ratio"]
+        # Never beyond the drag in its own width: the boundaries must not cross.
+        release, late_drag = narrow * drag * release / (drag + release), drag * values["late_drag_ratio"]
 
         def rising(torque):
             engaged = np.tanh((torque - drag) / width)
-            engaged += share * (np.tanh((torque + release) / width) - engaged)
+            engaged += late * (np.tanh((torque - late_drag) / width) - engaged)
+            engaged += share * (np.tanh((torque + release) / (narrow * width)) - engaged)
             return engaged
 
         start = np.array([drive.path.start_torque_nm]) - drive.shift_nm

@@ -20,7 +20,7 @@ class SecondBacklash:
     source = "stages of a multi-stage planetary train in series"
     parameters = (
         Parameter("second_clearance", "rad", "angle", LogNormal(0.03, 1.2), 0.0, STAGE),
-        Parameter("second_drag_torque", "N·m", "torque", LogUniform(0.05, 0.6), None, STAGE),
+        Parameter("second_drag_torque", "N·m", "torque", LogUniform(0.08, 0.6), None, STAGE),
         # A wide step is friction, one at high load is slip.
         Parameter("second_engagement_torque", "N·m", "torque", LogUniform(0.003, 0.06), None, "a narrow step"),
         Parameter("initial_second_gap_position", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
