@@ -98,11 +98,11 @@ def with_values(values):
     return replace(
         CALIBRATION, temperature=1 + np.exp(t), fast_temperature=1 + np.exp(ft), none=prior[0], single=prior[1], pair=prior[2],
         unknown=prior[3], imprint=1 + np.exp(imprint), fast=1 / (1 + np.exp(-fast)), misfit=tuple(misfit / misfit.sum()),
-        beside_level=tuple(np.array(CALIBRATION.beside_level) / sum(CALIBRATION.beside_level) / (1 + np.exp(-beside))),
+        remainder=np.exp(beside),
     )  # fmt: skip
 
 
-START = np.array([np.log(3.0), np.log(3.0), np.log(0.3), np.log(0.4), np.log(0.08), np.log(0.22), -1.7, -0.4, -0.8, 0.0])
+START = np.array([np.log(3.0), np.log(3.0), np.log(0.3), np.log(0.4), np.log(0.08), np.log(0.22), -1.7, -0.4, -5.8, 0.9])
 
 
 def find(results) -> np.ndarray:

@@ -11,10 +11,8 @@ SAME_LOOP = 0.05
 """Relative difference of amplitudes below which two records run the same loop."""
 FIRST_LEG_SHARED = 0.5
 SHARP = 6.0
-STEEP = 6.0
-"""How much larger the baseline's misfit may be where the loop is more than ten times as steep as usual."""
-TURNING = 2.0
-"""How much larger it may be just after a reversal."""
+STEEP, TURNING = 3.0, 1.0
+"""Misfit of the baseline in noise units where the loop is more than ten times as steep as usual, and just after a reversal."""
 
 
 class Places:
@@ -59,12 +57,12 @@ class Places:
         return common * share * 0.5 * (smooth + sharp)
 
     def misfit(self, length: float) -> np.ndarray:
-        """What a bench that is never quite clean leaves of any model: mostly the same in equal loops, a little of each kind.
+        """What a bench that is never quite clean leaves of any model: mostly the same in equal loops, a little of each kind."""
+        return 0.6 * self.loop(length) + 0.2 * self.own_loop(length) + 0.2 * self.time_smooth(0.3)
 
-        Steps and reversals are where the baseline's formulas are known least.
-        """
-        even = 0.6 * self.loop(length) + 0.2 * self.own_loop(length) + 0.2 * self.time_smooth(0.3)
-        return even * np.outer(self.uncertain, self.uncertain)
+    def sharp(self, length: float) -> np.ndarray:
+        """Misfit at steps and reversals, where the baseline's formulas are known least, in noise units squared."""
+        return np.outer(self.uncertain, self.uncertain) * self.misfit(length)
 
     def own_loop(self, length: float) -> np.ndarray:
         """The same, each record by itself."""
@@ -84,7 +82,7 @@ class Places:
 
 
 def _uncertain(problem, z, record):
-    """Size of the baseline's misfit at a record's blocks relative to the usual one, shape (blocks,)."""
+    """Size of the baseline's misfit at the steps and reversals of a record, in noise units, shape (blocks,)."""
     data = problem.records[record]
     blocks, amplitude = data.blocks, amplitude_nm(problem, record)
     angle = problem.model.angle(problem.values(z, record), data.path)
@@ -93,4 +91,4 @@ def _uncertain(problem, z, record):
     steep = np.clip((slope / np.median(slope) - 1) / 9, 0, 1)
     begin = blocks.turning_nm[blocks.leg]
     turning = np.where(blocks.leg > 0, np.exp(-np.abs(blocks.torque_nm - begin) / (0.1 * amplitude)), 0.0)
-    return 1 + STEEP * steep + TURNING * turning
+    return STEEP * steep + TURNING * turning

@@ -20,8 +20,10 @@ from backdrive_bayes.gap.fast import STICK_SLIP, VIBRATION, Fast
 class Calibration:
     """Temperatures of slow and fast evidences, and prior weights; misfit weights follow ``MISFIT_LEVELS``.
 
+    ``unknown`` is the weight of something else instead of any effect, ``remainder`` of something else beside the best one.
     ``imprint`` multiplies the temperature of slow evidences beside stick-slip, whose jumps leave traces in wide blocks that no
-    slow model explains; ``triple`` is the share left to three effects at once.
+    slow model explains; ``triple`` is the share left to three effects at once, or to fast
+    structure with something unknown beside it.
     """
 
     temperature: float = 7.5
@@ -30,12 +32,12 @@ class Calibration:
     single: float = 0.43
     pair: float = 0.04
     unknown: float = 0.15
+    remainder: float = 0.003
     fast: float = 0.1
     imprint: float = 3.4
     triple: float = 0.02
     misfit: tuple[float, ...] = (0.5, 0.26, 0.13, 0.07, 0.04)
     unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
-    beside_level: tuple[float, ...] = (0.0, 0.0, 0.0, 0.1, 0.1, 0.1)
 
 
 CALIBRATION = Calibration()
@@ -76,7 +78,8 @@ def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) 
     for name, q in quick.items():
         for effects, p in slow[calibration.imprint if name == STICK_SLIP else 1.0].items():
             both = _union(effects, name)
-            share = calibration.triple if len(both) > 2 else 1.0
+            more = len(both) > 2 or (effects == UNKNOWN and name not in (None, VIBRATION))
+            share = calibration.triple if more else 1.0
             joint[both] = joint.get(both, 0.0) + p * q * share
     total = sum(joint.values())
     return {effects: p / total for effects, p in joint.items()}
@@ -96,10 +99,10 @@ def _slow(evidences, c, temperature):
         effects: np.log(share[len(effects)]) + logsumexp(values + misfit) / temperature
         for effects, values in evidences.slow.items()
     }
-    with np.errstate(divide="ignore"):
-        levels = np.log([c.unknown_level, c.beside_level])[:, None, :]
-    total = logsumexp(evidences.unexplained + levels) - np.log(evidences.unexplained.shape[1])
-    score[UNKNOWN] = np.log(c.unknown) + total / temperature
+    kinds = np.log(np.array(c.unknown_level)[None, None, :] / evidences.unexplained.shape[1])
+    alone, beside = logsumexp(evidences.unexplained + kinds, axis=(1, 2)) / temperature
+    # What the best effect leaves is mostly the error of its formula and of the baseline's.
+    score[UNKNOWN] = np.logaddexp(np.log(c.unknown) + alone, np.log(c.remainder) + beside)
     return _normalised(score)
 
 

@@ -75,8 +75,11 @@ class Setting:
         return Whitening.of(self.covariance(*terms), self.places.record)
 
     def covariance(self, *terms) -> np.ndarray:
-        """Noise plus misfit, (blocks, blocks); ``terms`` are (kernel name, length, standard deviation in noise units) each."""
-        covariance = self.noise.copy()
+        """Noise, sharp misfit and more, (blocks, blocks).
+
+        ``terms`` are (kernel name, length, standard deviation in noise units) each.
+        """
+        covariance = self.noise + self.noise_rad**2 * self.kernel("sharp", MISFIT_LENGTH)
         for name, length, deviation in terms:
             covariance += (deviation * self.noise_rad) ** 2 * self.kernel(name, length)
         return covariance

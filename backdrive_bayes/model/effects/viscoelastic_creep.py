@@ -29,7 +29,8 @@ class ViscoelasticCreep:
         Parameter("creep_time", "s", "none", LogUniform(0.3, 30.0), None, POLYMER),
         Parameter("creep_slow_share", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
         Parameter("initial_creep", "1", "none", Normal(0.05), None, "the unit's past is unknown", True),
-        Parameter("creep_threshold", "N·m", "torque", Uniform(0.0, 0.7), None, "no preference"),
+        # A fast creep near full load would be slip.
+        Parameter("creep_threshold", "N·m", "torque", Uniform(0.0, 0.5), None, "up to half the rated torque"),
     )
 
     def respond(self, values, drive):
