@@ -26,7 +26,7 @@ PAIRS_FITTED = 4
 POLISHED = 3
 SEARCHES = 3
 SETTLED = 5.0
-"""Log posterior by which a fresh search may find a better mode before another is due."""
+"""Log posterior by which a fresh search may find a better mode before another is due, where the choice is close."""
 WORTHWHILE = 4.0
 """Log-likelihood by which a pair must beat its better half in the linear search to be fitted."""
 
@@ -108,12 +108,16 @@ def _polish_best(setting, weighed, rng):
 
 
 def _settle(setting, weighed, rng):
-    """The best hypothesis searched anew until that finds nothing better; and whether it ever did so."""
+    """The best hypothesis searched anew until that finds nothing that could matter; and whether it ever did so.
+
+    What a search still gains might be gained for the next best as well: half the lead is enough.
+    """
     for _ in range(SEARCHES):
-        best = max(weighed, key=lambda w: w.log_evidence.max())
+        best, *others = sorted(weighed, key=lambda w: -w.log_evidence.max())
+        lead = best.log_evidence.max() - others[0].log_evidence.max() if others else 0.0
         again = polished(best.fitted, rng)
         before, after = best.fitted.problem.log_posterior(np.array([best.fitted.z, again.z]))
-        if after <= before + SETTLED:
+        if after <= before + max(SETTLED, 0.5 * lead):
             return weighed, True
         better = _better(best, _weigh(setting, again))
         weighed = [better if w is best else w for w in weighed]

@@ -1,10 +1,13 @@
 """The whole diagnosis on units of the virtual bench: names what is there, nothing where nothing is, unknown without the name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from backdrive_bayes.bench.plan import make_plan
 from backdrive_bayes.bench.unit import draw_unit
+from backdrive_bayes.gap import diagnose as gap_diagnose
 from backdrive_bayes.gap.diagnose import diagnose
 from backdrive_bayes.model.registry import BASELINE, candidates_beside
 
@@ -58,6 +61,14 @@ def test_without_its_name_in_the_library_the_effect_is_not_named(lagging, found)
 def test_nothing_is_named_where_nothing_is_missing():
     result = diagnose(unit_with(3)).json
     assert result["answer"]["effects"] == [] and result["which"][0]["effect"] == "none"
+
+
+def test_no_name_where_the_search_has_not_settled(lagging, monkeypatch):
+    weigh = gap_diagnose.weigh_all
+    monkeypatch.setattr(gap_diagnose, "weigh_all", lambda *args: replace(weigh(*args), settled=False))
+    result = diagnose(lagging).json
+    assert "sensor_lag" in result["inconclusive"] and "--seed" in result["inconclusive"]
+    assert result["answer"]["effects"] == []
 
 
 def test_same_seed_same_diagnosis(lagging, found):
