@@ -1,11 +1,13 @@
 """Covariance of block means against the raw grid it averages over, and whitening with it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.bench import block_means, even_blocks, known_estimate, noise_paths, raw_covariance
 
 from backdrive_bayes.bench.known_truth import BenchNoise
-from backdrive_bayes.inference.covariance import block_covariance, whitener
+from backdrive_bayes.inference.covariance import BEND_ERROR, block_covariance, whitener
 from backdrive_bayes.inference.problem import RecordData
 from backdrive_bayes.records.reduction import Blocks
 
@@ -94,6 +96,14 @@ def test_torque_noise_enters_through_the_slope():
     slope = np.linspace(0, 3, CUTS.size - 1)
     added = block_covariance(blocks, estimate, slope) - block_covariance(blocks, estimate)
     np.testing.assert_allclose(added, np.diag(slope**2 * blocks.torque_variance_nm2), atol=1e-20)
+
+
+def test_a_corrected_mean_carries_part_of_its_correction_as_error():
+    blocks, estimate = uneven_blocks(CUTS), known_estimate(NOISE)
+    bent = replace(blocks, bend_rad=np.linspace(-1e-3, 2e-3, CUTS.size - 1))
+    added = block_covariance(bent, estimate) - block_covariance(blocks, estimate)
+    np.testing.assert_allclose(added, np.diag((BEND_ERROR * bent.bend_rad) ** 2), atol=1e-18)
+    assert np.diag(added).max() > 1e-8
 
 
 def test_whitener_whitens():

@@ -10,7 +10,8 @@ from support.known import RATED, SCALE, as_arrays, reducer, settled_loops, typic
 from backdrive_bayes.bench.known_truth import ramp
 from backdrive_bayes.indicators.indicators import loop_area_j
 from backdrive_bayes.indicators.loop import Loops, model_loops
-from backdrive_bayes.indicators.summary import reducer_loops
+from backdrive_bayes.indicators.summary import core_indicators, reducer_loops
+from backdrive_bayes.inference import discrepancy
 from backdrive_bayes.inference.discrepancy import angle_jacobian, learn_discrepancy
 from backdrive_bayes.inference.fit import prepare
 
@@ -113,6 +114,28 @@ def test_absent_discrepancy_draws_nothing(spoilt):
     none = replace(prepared.discrepancy, scale_rad=0.0)
     assert not none.present
     assert not none.draw(prepared.problem, prepared.optimum.z[None], np.random.default_rng(0)).any()
+
+
+def tip_miss(cusp_share, monkeypatch):
+    """How far the peak angle's median lies from the truth, in standard deviations, for smooth misfit with sharp tips."""
+    monkeypatch.setattr(discrepancy, "CUSP_SHARE", cusp_share)
+    unit, torque = unit_of(1, rate=RATE), ramp(RATED, RATE)[1]
+    # Zero at both tips but for an even part, which leaves the peak as it is.
+    smooth = 5 * misfit(torque, np.sign(np.gradient(torque)))
+    sharp = 3 * MISFIT_RAD * np.sign(torque) * np.exp(-(RATED - np.abs(torque)) / (0.1 * RATED))
+    record = replace(unit.records[0], angle_rad=unit.records[0].angle_rad + smooth + sharp)
+    prepared = prepare(replace(unit, records=(record,)), np.random.default_rng(0), scale=SCALE)
+    rng, d = np.random.default_rng(1), prepared.discrepancy
+    z = rng.multivariate_normal(prepared.optimum.z, prepared.optimum.covariance, 400)
+    loops = reducer_loops(prepared.problem, d, z, d.draw(prepared.problem, z, rng), 0, K)
+    peak = core_indicators(loops, K * RATED)["peak_angle_rad"]
+    plain = core_indicators(settled_loops(reducer(), as_arrays(typical_values(reducer())), loops.torque_nm), K * RATED)
+    return abs(np.median(peak) - plain["peak_angle_rad"][0] - 3 * MISFIT_RAD) / np.std(peak)
+
+
+def test_a_cusp_at_the_tips_is_followed(monkeypatch):
+    assert tip_miss(discrepancy.CUSP_SHARE, monkeypatch) < 2.5
+    assert tip_miss(1e-6, monkeypatch) > 2.5
 
 
 def test_learning_is_deterministic(spoilt):
