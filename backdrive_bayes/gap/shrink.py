@@ -15,6 +15,7 @@ from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
 
 DRAWS = 200
+SMALLEST_GAP = 0.2
 MISFIT = ("misfit", MISFIT_LENGTH, 0.3)
 
 
@@ -99,6 +100,9 @@ def _record_means(values, record):
 
 
 def closed_fraction(before, after, floor) -> np.ndarray:
-    """(rms before − rms after) / (rms before − noise floor), of mean squares [rad²]; at most 1."""
+    """(rms before − rms after) / (rms before − noise floor), of mean squares [rad²], within −1 and 1.
+
+    A gap of less than a fifth of the noise floor counts as that much: shares of nothing mean nothing.
+    """
     gap = np.sqrt(before) - np.sqrt(floor)
-    return np.minimum((np.sqrt(before) - np.sqrt(after)) / np.maximum(gap, 1e-3 * np.sqrt(floor)), 1.0)
+    return np.clip((np.sqrt(before) - np.sqrt(after)) / np.maximum(gap, SMALLEST_GAP * np.sqrt(floor)), -1.0, 1.0)
