@@ -38,7 +38,7 @@ K = 0.03
 RANKS = 99
 
 
-def one_unit(seed: int, budget: float = 60.0, noise_factor: float = 1.0) -> dict:
+def one_unit(seed: int, budget: float = 120.0, noise_factor: float = 1.0) -> dict:
     """Fit one simulated unit; ranks of the truth among thinned draws, whether 90 % intervals hold it, convergence."""
     rng = np.random.default_rng([20261121, seed])
     model = ReducerModel(members_named(BASELINE), SCALE)
@@ -109,6 +109,13 @@ def summarise(results) -> dict:
             "median_seconds": float(np.median([r["seconds"] for r in results]))}
 
 
+def keep(results, out) -> dict:
+    """Write what is known so far and return its summary."""
+    summary = summarise(results)
+    (out / "calibration.json").write_text(json.dumps(summary | {"runs": results}, indent=1))
+    return summary
+
+
 def draw_ranks(summary, path):
     """Rank histograms of every quantity with the 99 % band of a uniform."""
     import matplotlib
@@ -143,16 +150,17 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("reports/calibration"))
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.units)
+    options.out.mkdir(parents=True, exist_ok=True)
+    results = []
     with ProcessPoolExecutor(options.workers) as pool:
-        results = []
         for result in pool.map(one_unit, seeds):
             results.append(result)
             bad = [k for k, v in result["quantities"].items() if abs(v["z"]) > 3.5]
             told = f"converged {result['converged']}, {result['seconds']:.1f} s, far off: {bad}"
             print(f"unit {result['seed']}: {told}", flush=True)
-    summary = summarise(results)
-    options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "calibration.json").write_text(json.dumps(summary | {"runs": results}, indent=1))
+            if len(results) % 10 == 0:
+                summary = keep(results, options.out)
+    summary = keep(results, options.out)
     draw_ranks(summary, options.out / "ranks.png")
     for name, row in summary["quantities"].items():
         print(f"{name:32s} {row['share']:.3f} {'' if row['inside_99_bounds'] else 'OUTSIDE'} p={row['rank_p_value']:.3f}")
