@@ -23,6 +23,9 @@ from backdrive_bayes.gap.diagnose import diagnose
 from backdrive_bayes.records.unit_folder import read_unit
 
 
+NOTE = "Probabilities of an inconclusive unit are those at the fit that the search had found when it ended."
+
+
 def answer(job) -> dict:
     """Diagnosis of one unit folder; residual curves are left out of the file to keep it small."""
     warnings.simplefilter("ignore")
@@ -40,7 +43,7 @@ def row(result) -> str:
     """One line of the table."""
     top = ", ".join(f"{w['effect']} {w['probability']:.2f}" for w in result["which"][:3])
     closed = result["shrink"]["closed_fraction"]["median"]
-    named = " + ".join(result["answer"]["effects"]) or "none"
+    named = "inconclusive" if result["inconclusive"] else " + ".join(result["answer"]["effects"]) or "none"
     return f"| {result['folder']} | {named} | {top} | {closed:.2f} | {result['took_s']:.0f} |"
 
 
@@ -58,7 +61,7 @@ def main():
         for result in pool.map(answer, jobs):
             rows.append(row(result))
             print(rows[-1], flush=True)
-    head = ["# Answers", "", f"Run number {options.run} on these units; labels unknown, nothing tuned on them.", ""]
+    head = ["# Answers", "", f"Run number {options.run} on these units; labels unknown, nothing tuned on them.", NOTE, ""]
     head += ["| unit | answer | most probable | closed fraction | s |", "|---|---|---|---|---|"]
     (options.out / "README.md").write_text("\n".join(head + rows) + "\n", encoding="utf-8")
     (options.out / "run.json").write_text(json.dumps({"run": options.run, "units": len(rows)}))
