@@ -22,7 +22,6 @@ from backdrive_bayes.commands.output import write_json
 from backdrive_bayes.gap.diagnose import diagnose
 from backdrive_bayes.records.unit_folder import read_unit
 
-
 NOTE = "Probabilities of an inconclusive unit are those at the fit that the search had found when it ended."
 
 
