@@ -30,7 +30,7 @@ class Calibration:
     fast_temperature: float = 8.0
     none: float = 0.38
     single: float = 0.43
-    pair: float = 0.04
+    pair: float = 0.005
     unknown: float = 0.15
     remainder: float = 0.003
     fast: float = 0.1
