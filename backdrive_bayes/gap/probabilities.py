@@ -28,8 +28,8 @@ class Calibration:
 
     temperature: float = 7.5
     fast_temperature: float = 8.0
-    none: float = 0.38
-    single: float = 0.43
+    none: float = 0.4
+    single: float = 0.445
     pair: float = 0.005
     unknown: float = 0.15
     remainder: float = 0.003
