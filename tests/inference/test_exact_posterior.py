@@ -81,8 +81,9 @@ def curvature_bias(blocks_per_segment, corrected=True):
 
 def test_reduced_posterior_agrees_with_the_exact_one(exact):
     shift, spread = disagreement(exact, problem_of(exact[0], NOISE))
-    # Blocks lose a few per cent of the information, which moves the mean by the square root of that at most.
-    assert spread < 0.08
+    # Blocks lose some of the information, most of it (a tenth of the sd) along the shape of the step, which moves the mean by the
+    # square root of that at most.
+    assert spread < 0.12
     assert shift < 0.45
 
 
@@ -94,7 +95,7 @@ def test_finer_blocks_agree_better(exact):
 
 def test_too_few_blocks_are_noticed(exact):
     shift, spread = disagreement(exact, problem_of(exact[0], NOISE, blocks_per_segment=15))
-    assert shift > 0.45 and spread > 0.08
+    assert shift > 0.45 and spread > 0.12
 
 
 def test_independent_blocks_are_noticed(exact):
