@@ -13,7 +13,7 @@ demo: $(VENV)/ready
 	cp reports/demo/reducer-1/figures/loop-2.png reports/demo/loop.png
 
 test: $(VENV)/ready
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/ready
 	$(BIN)/python -m pip install --quiet ruff
