@@ -21,8 +21,8 @@ from backdrive_bayes.model.path import TorquePath
 
 HARMONICS = 72
 FIRST_LEG_TERMS = 16
-CUSPS = np.array([0.003, 0.01, 0.03, 0.1])
-"""Widths, in loops, of the cusps that the discrepancy may have at either tip."""
+CUSPS = np.array([0.01, 0.03, 0.1])
+"""Widths, in loops, of the cusps that the discrepancy may have at either tip; no narrower than blocks can see."""
 CUSP_SHARE = 0.3
 """Prior standard deviation of a cusp, relative to that of the smooth part."""
 WIDTH = 2 * HARMONICS + 2 * CUSPS.size + FIRST_LEG_TERMS
