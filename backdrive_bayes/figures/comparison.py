@@ -36,11 +36,8 @@ SHARES = (("S_g_over_S", "geometric error", BLUE, ""), ("S_f_over_S", "friction"
 def draw_loops(comparison: dict, conditions: list[int]):
     """Overlaid loops at the given overlays (at most three), angle [arcmin] over torque [N·m]."""
     with styled():
-        figure = new_figure(3.3)
-        axes = _panels(figure, comparison, conditions)
-        for panel, condition in zip(axes, conditions, strict=True):
-            for record, look, name in _members(comparison, condition):
-                _one_loop(panel, record["loop"], look, name)
+        figure, axes = _overlaid(comparison, conditions, 3.3, _one_loop)
+        for panel in axes:
             panel.set_xlabel("torque [N·m]")
         axes[0].set_ylabel("angle [arcmin]")
         _legend(figure, axes[0])
@@ -50,18 +47,22 @@ def draw_loops(comparison: dict, conditions: list[int]):
 def draw_energy(comparison: dict, conditions: list[int]):
     """Overlaid torque–energy curves at the given overlays (at most three), mJ per N·m over |torque| [N·m]."""
     with styled():
-        figure = new_figure(2.9)
-        axes = _panels(figure, comparison, conditions)
-        for panel, condition in zip(axes, conditions, strict=True):
-            for record, look, name in _members(comparison, condition):
-                curve = record["torque_energy"]
-                lo, hi, median = (np.asarray(curve[k]) * MJ_PER_J for k in ("lo", "hi", "median_J_per_Nm"))
-                panel.fill_between(curve["torque_Nm"], lo, hi, color=look["color"], alpha=0.3, linewidth=0)
-                panel.plot(curve["torque_Nm"], median, color=look["color"], linestyle=look["linestyle"], label=name)
+        figure, axes = _overlaid(comparison, conditions, 2.9, _one_energy)
+        for panel in axes:
             panel.set(xlabel="|torque| [N·m]", xlim=(0, None), ylim=(0, None))
         axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
         _legend(figure, axes[0])
     return figure
+
+
+def _overlaid(comparison, conditions, height, draw):
+    """A figure of that height [inch] with one panel a condition, ``draw`` called for every unit; and its panels."""
+    figure = new_figure(height)
+    axes = _panels(figure, comparison, conditions)
+    for panel, condition in zip(axes, conditions, strict=True):
+        for record, look, name in _members(comparison, condition):
+            draw(panel, record, look, name)
+    return figure, axes
 
 
 def draw_ratios(comparison: dict, pair: int):
@@ -135,11 +136,19 @@ def _members(comparison, condition):
         yield comparison["units"][unit]["records"][member["record"]], SERIES[unit % len(SERIES)], _short(member["unit"])
 
 
-def _one_loop(panel, loop, look, name):
+def _one_loop(panel, record, look, name):
+    loop = record["loop"]
     for i, branch in enumerate(("rising_rad", "falling_rad")):
         lo, hi, median = (np.asarray(loop[branch][k]) * ARCMIN_PER_RAD for k in ("lo", "hi", "median"))
         panel.fill_between(loop["torque_Nm"], lo, hi, color=look["color"], alpha=0.3, linewidth=0)
         panel.plot(loop["torque_Nm"], median, color=look["color"], linestyle=look["linestyle"], label=None if i else name)
+
+
+def _one_energy(panel, record, look, name):
+    curve = record["torque_energy"]
+    lo, hi, median = (np.asarray(curve[k]) * MJ_PER_J for k in ("lo", "hi", "median_J_per_Nm"))
+    panel.fill_between(curve["torque_Nm"], lo, hi, color=look["color"], alpha=0.3, linewidth=0)
+    panel.plot(curve["torque_Nm"], median, color=look["color"], linestyle=look["linestyle"], label=name)
 
 
 def _legend(figure, panel):

@@ -3,7 +3,10 @@ import hashlib
 import lzma
 import os
 
+import nptdms
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pytest
 from conftest import answer, ramps, write_csv
 from hypothesis import HealthCheck, given, settings
@@ -20,12 +23,10 @@ COLUMNS = {"time_s": TIME, "torque_Nm": TORQUE, "angle_arcmin": ANGLE / ARCMIN}
 
 
 def parquet(path):
-    table = pytest.importorskip("pyarrow").table(COLUMNS)
-    pytest.importorskip("pyarrow.parquet").write_table(table, path)
+    pyarrow.parquet.write_table(pyarrow.table(COLUMNS), path)
 
 
 def tdms(path):
-    nptdms = pytest.importorskip("nptdms")
     with nptdms.TdmsWriter(path) as writer:
         writer.write_segment([nptdms.ChannelObject("bench", name, data) for name, data in COLUMNS.items()])
 
