@@ -172,6 +172,9 @@ def test_decisions_load_no_optional_library():
 def test_members_are_named_in_the_registry_only():
     """A new effect is one file and one line: nothing else imports a member's module."""
     plumbing = {
+        "bend",
+        "gap",
+        "kernels",
         "hat_weights",
         "member",
         "parameter",

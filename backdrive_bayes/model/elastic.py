@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from backdrive_bayes.model.bend import bent_line
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter
 
@@ -32,7 +31,4 @@ class Elastic:
         """Angle [rad] of shape (…, samples)."""
         ratio, knee = values["hardening_ratio"], values["hardening_torque"]
         slope = values["compliance"] * ratio
-        bend = np.tanh(drive.transmitted_nm / knee)
-        bend *= (values["compliance"] - slope) * knee
-        bend += slope * drive.transmitted_nm
-        return bend
+        return bent_line(drive.transmitted_nm, knee, slope, (values["compliance"] - slope) * knee)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from backdrive_bayes.model.gap import Steps, positions_in_gap
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogNormal, Parameter, Uniform
-from backdrive_bayes.model.play import play_from
 
 CATALOGUE = "weakly informative; clearance, drag and engagement of small planetary stages in catalogues"
 
@@ -44,19 +42,11 @@ class Geometric:
         drag, width, late = values["drag_torque"], values["engagement_torque"], values["late_share"]
         share, release, narrow = values["release_share"], values["release_torque"], values["release_width_ratio"]
         # Never beyond the drag in its own width: the boundaries must not cross.
-        release, late_drag = narrow * drag * release / (drag + release), drag * values["late_drag_ratio"]
-
-        def rising(torque):
-            engaged = np.tanh((torque - drag) / width)
-            engaged += late * (np.tanh((torque - late_drag) / width) - engaged)
-            engaged += share * (np.tanh((torque + release) / (narrow * width)) - engaged)
-            return engaged
-
-        start = np.array([drive.path.start_torque_nm]) - drive.shift_nm
-        low, high = rising(start), -rising(-start)
-        place, spread = 0.5 * (1 + values["initial_gap_position"]), values["initial_gap_spread"]
-        gap, below, above = play_from(drive.path, rising, [low + place * (high - low), low, high], drive.shift_nm)
-        below += place * (above - below)
-        gap += spread * (below - gap)
+        release = narrow * drag * release / (drag + release)
+        inner = 1 - share
+        shares = (inner * (1 - late), inner * late, share)
+        steps = Steps(shares, (drag, drag * values["late_drag_ratio"], -release), width, narrow)
+        place = 0.5 * (1 + values["initial_gap_position"])
+        gap = positions_in_gap(drive, steps, place, values["initial_gap_spread"])
         gap *= 0.5 * values["clearance"]
         return gap

@@ -37,6 +37,15 @@ class TorquePath:
         return np.concatenate([np.full(leg.stop - leg.start, float(leg.direction)) for leg in self.legs])
 
     @functools.cached_property
+    def leg_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Last sample + 1, direction ±1.0 and end torque [N·m] of the legs, shape (legs,) each."""
+        legs = self.legs
+        return (
+            np.array([leg.stop for leg in legs]), np.array([float(leg.direction) for leg in legs]),
+            np.array([leg.end_torque_nm for leg in legs]),
+        )  # fmt: skip
+
+    @functools.cached_property
     def rate_nm_per_s(self) -> np.ndarray:
         """Mean loading rate |dτ/dt| of the leg at each sample [N·m/s], shape (samples,)."""
         rates, last = [], self.start_torque_nm

@@ -19,24 +19,13 @@ def play(path: TorquePath, lower, state, shift_nm=0.0):
     one, -lower(-torque). ``state`` (…, 1) is where the operator is before the path begins; it is moved between the
     boundaries at the first torque. The operator feels the path's torque less ``shift_nm`` (scalar or (…, 1)).
     """
-    return play_from(path, lower, [state], shift_nm)[0]
-
-
-def play_from(path: TorquePath, lower, states, shift_nm=0.0) -> list[np.ndarray]:
-    """The same operator begun from each of several ``states``; its boundaries are computed once."""
     direction = path.direction
     bound = lower(direction * (path.torque_nm - shift_nm))
     bound *= direction
     signs = np.array([leg.direction for leg in path.legs], float)
     ends = lower(signs * (np.array([leg.end_torque_nm for leg in path.legs]) - shift_nm)) * signs
     start = lower((path.start_torque_nm - shift_nm) * np.array([1.0, -1.0]))
-    clipped = [np.clip(state, start[..., :1], -start[..., 1:]) for state in states]
-    copies = [bound.copy() for _ in states[1:]]
-    return [_held(path, b, ends, state) for b, state in zip([*copies, bound], clipped, strict=True)]
-
-
-def _held(path, bound, ends, state):
-    """Hold the state between the boundaries leg by leg, in place of ``bound``."""
+    state = np.clip(state, start[..., :1], -start[..., 1:])
     for k, leg in enumerate(path.legs):
         hold = np.maximum if leg.direction > 0 else np.minimum
         part = bound[..., leg.start : leg.stop]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from backdrive_bayes.model.bend import bent_line
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogUniform, Normal, Parameter
 
@@ -23,4 +22,5 @@ class HardeningStiffness:
     def respond(self, values, drive):
         """Angle [rad], shape (…, samples)."""
         knee = values["hardening_knee"]
-        return values["hardening_compliance"] * (drive.transmitted_nm - knee * np.tanh(drive.transmitted_nm / knee))
+        more = values["hardening_compliance"]
+        return bent_line(drive.transmitted_nm, knee, more, -more * knee)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from backdrive_bayes.model.gap import Steps, positions_in_gap
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter, Uniform
-from backdrive_bayes.model.play import play
 
 STAGE = "weakly informative: a stage with more preload than the first"
 
@@ -28,12 +26,6 @@ class SecondBacklash:
 
     def respond(self, values, drive):
         """Angle [rad], shape (…, samples)."""
-        drag, width = values["second_drag_torque"], values["second_engagement_torque"]
-
-        def rising(torque):
-            return np.tanh((torque - drag) / width)
-
-        start = np.array([drive.path.start_torque_nm]) - drive.shift_nm
-        low, high = rising(start), -rising(-start)
-        state = low + 0.5 * (1 + values["initial_second_gap_position"]) * (high - low)
-        return 0.5 * values["second_clearance"] * play(drive.path, rising, state, drive.shift_nm)
+        steps = Steps((1.0, 0.0, 0.0), (values["second_drag_torque"], 0.0, 0.0), values["second_engagement_torque"])
+        place = 0.5 * (1 + values["initial_second_gap_position"])
+        return 0.5 * values["second_clearance"] * positions_in_gap(drive, steps, place)
