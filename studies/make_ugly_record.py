@@ -21,9 +21,9 @@ from backdrive_bayes.model.registry import BASELINE, members_named
 
 TRUTH = {
     "clearance": 0.012, "drag_torque": 0.05, "engagement_torque": 0.02, "release_share": 0.1, "release_torque": 0.03,
-    "release_width_ratio": 1.0, "late_share": 0.0, "late_drag_ratio": 1.0,
+    "release_width_ratio": 1.0, "late_share": 0.0, "late_drag_ratio": 1.0, "late_width_ratio": 1.0,
     "initial_gap_position": 0.3, "initial_gap_spread": 0.0, "compliance": 0.012, "hardening_ratio": 0.6, "hardening_torque": 0.8,
-    "friction_torque": 0.06, "friction_ratio": 0.05, "friction_spread": 0.5, "free_share": 0.2,
+    "friction_torque": 0.06, "friction_ratio": 0.05, "friction_spread": 0.5, "load_spread": 0.5, "free_share": 0.2,
     "initial_friction_state": -0.5,
 }
 RATED = 2.0

@@ -179,7 +179,7 @@ def _jax_potential(problem):
 
     def angle(v):
         w = jnp.outer(hats(CONSTANT_SHARES, v["friction_torque"] / rated, v["friction_spread"]),
-                      hats(LOAD_RATIOS, v["friction_ratio"], v["friction_spread"])).ravel()
+                      hats(LOAD_RATIOS, v["friction_ratio"], v["load_spread"])).ravel()
         w = ((1 - v["free_share"]) * w).at[0].add(v["free_share"])
         start = v["initial_friction_state"]
         past = jnp.concatenate([w * jnp.maximum(start, 0), w * jnp.maximum(-start, 0)])
@@ -190,9 +190,11 @@ def _jax_potential(problem):
         release = v["release_width_ratio"] * drag * release / (drag + release)
 
         def rising(x):
-            e, late = v["release_share"], v["late_share"]
-            early, second = (jnp.tanh((x - d) / v["engagement_torque"]) for d in (drag, drag * v["late_drag_ratio"]))
-            back = jnp.tanh((x + release) / (v["release_width_ratio"] * v["engagement_torque"]))
+            late, width = v["late_share"], v["engagement_torque"]
+            e = v["release_share"] * (1 - late)
+            early = jnp.tanh((x - drag) / width)
+            second = jnp.tanh((x - drag * v["late_drag_ratio"]) / (v["late_width_ratio"] * width))
+            back = jnp.tanh((x + release) / (v["release_width_ratio"] * width))
             return (1 - e) * ((1 - late) * early + late * second) + e * back
 
         bound = rising(direction * torque) * direction

@@ -24,7 +24,7 @@ class Friction:
     """Torque that reaches the elastic parts: a distribution of play operators (Prandtl-Ishlinskii).
 
     An element holds until the torque has moved by r + m|τ| away from it. r and m are independent and log-normal with
-    means ``friction_torque`` and ``friction_ratio`` and the common log-sd ``friction_spread``, carried by mean-preserving
+    means ``friction_torque`` and ``friction_ratio`` and log-sds ``friction_spread`` and ``load_spread``, carried by mean-preserving
     hat weights on a fixed grid; ``free_share`` of the torque passes without friction. On saturated branches of a linear
     elastic unit this is the constant ∓d₀ of eq. (20), reconstructed, plus a part that grows with the load.
     """
@@ -37,6 +37,7 @@ class Friction:
         Parameter("friction_torque", "N·m", "torque", BoundedLogNormal(0.03, 1.0, 0.6), 0.0, MESH),
         Parameter("friction_ratio", "1", "none", BoundedLogNormal(0.05, 1.0, 0.7), 0.0, MESH),
         Parameter("friction_spread", "1", "none", BoundedLogNormal(0.5, 0.5, 1.5), None, "between one threshold and a decade"),
+        Parameter("load_spread", "1", "none", BoundedLogNormal(0.5, 0.5, 1.5), None, "between one threshold and a decade"),
         Parameter("free_share", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
         Parameter("initial_friction_state", "1", "none", Uniform(-1.0, 1.0), None, "the unit's past is unknown", True),
     )
@@ -44,7 +45,7 @@ class Friction:
     def respond(self, values, drive):
         """Transmitted torque [N·m] of shape (…, samples)."""
         level, start = values["friction_torque"] / drive.rated_torque_nm, values["initial_friction_state"]
-        shared = (level, values["friction_ratio"], values["friction_spread"], values["free_share"])
+        shared = (level, values["friction_ratio"], values["friction_spread"], values["load_spread"], values["free_share"])
         weights = _weights(*((np.shape(v), np.asarray(v, float).tobytes()) for v in shared))
         past = np.concatenate([weights * np.maximum(start, 0), weights * np.maximum(-start, 0)], axis=-1)
         if np.ndim(drive.shift_nm) == 0:
@@ -55,8 +56,8 @@ class Friction:
 @functools.lru_cache(maxsize=2)
 def _weights(*shared: tuple[tuple[int, ...], bytes]) -> np.ndarray:
     """Weights of the bank's elements, shape (…, elements); the records of a unit ask for the same ones in turn."""
-    level, ratio, spread, free = (np.frombuffer(data).reshape(shape) for shape, data in shared)
-    constant, load = hat_weights(CONSTANT_SHARES, level, spread), hat_weights(LOAD_RATIOS, ratio, spread)
+    level, ratio, spread, load_spread, free = (np.frombuffer(data).reshape(shape) for shape, data in shared)
+    constant, load = hat_weights(CONSTANT_SHARES, level, spread), hat_weights(LOAD_RATIOS, ratio, load_spread)
     weights = (constant[..., :, None] * load[..., None, :]).reshape(*constant.shape[:-1], -1)
     weights *= 1 - free
     # The first element of the bank has no threshold: it passes the torque as it is.

@@ -13,14 +13,12 @@ from backdrive_bayes.model.kernels import gap_positions
 class Steps:
     """The rising boundary Σ share·tanh((τ - torque)/width) of a gap; the falling one is its mirror image.
 
-    Three ``shares`` that sum to one and their ``torques`` [N·m], each a number or (…, 1). All have ``width`` [N·m], the last
-    of them ``narrow`` of it.
+    Three ``shares`` that sum to one, their ``torques`` and ``widths`` [N·m], each a number or (…, 1).
     """
 
     shares: tuple
     torques: tuple
-    width: np.ndarray
-    narrow: np.ndarray | float = 1.0
+    widths: tuple
 
 
 def positions_in_gap(drive, steps: Steps, place, spread=0.0) -> np.ndarray:
@@ -29,8 +27,8 @@ def positions_in_gap(drive, steps: Steps, place, spread=0.0) -> np.ndarray:
     ``place`` from 0 to 1 (…, 1) is where the path begins between the boundaries; teeth that share the gap may have been left at
     different places: the share ``spread`` (…, 1) of them lies at the one flank or the other so as to give the same mean position.
     """
-    fine = 1 / steps.width
-    columns = np.broadcast_arrays(*steps.shares, *steps.torques, drive.shift_nm, fine, fine, fine / steps.narrow, place, spread)
+    fine = [1 / width for width in steps.widths]
+    columns = np.broadcast_arrays(*steps.shares, *steps.torques, drive.shift_nm, *fine, place, spread)
     shape, path = columns[0].shape[:-1], drive.path
     table = np.stack([c.reshape(-1) for c in columns], axis=-1)
     out = np.empty((table.shape[0], path.torque_nm.size))

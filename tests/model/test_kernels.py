@@ -24,18 +24,17 @@ def test_gap_is_the_play_operator_between_its_boundaries(seed):
     share, late = rng.uniform(0, 0.5, n), rng.uniform(0, 0.5, n)
     shares = ((1 - share) * (1 - late), (1 - share) * late, share)
     torques = (rng.uniform(0.05, 0.3, n), rng.uniform(0.3, 0.5, n), -0.01 * rng.uniform(0, 1, n))
-    width, narrow = rng.uniform(0.02, 0.2, n), rng.uniform(0.2, 1, n)
+    widths = tuple(rng.uniform(0.02, 0.2, (3, *n)))
     place, spread, shift = rng.uniform(0, 1, n), rng.uniform(0, 1, n), rng.uniform(-0.1, 0.1, n)
 
     def rising(t):
-        widths = (width, width, narrow * width)
         return sum(s * np.tanh((t - d) / w) for s, d, w in zip(shares, torques, widths, strict=True))
 
     start = path.start_torque_nm - shift
     low, high = rising(start), -rising(-start)
     middle, below, above = (play(path, rising, state, shift) for state in (low + place * (high - low), low, high))
     expected = middle + spread * (below + place * (above - below) - middle)
-    found = positions_in_gap(Drive(path, 1.0, shift_nm=shift), Steps(shares, torques, width, narrow), place, spread)
+    found = positions_in_gap(Drive(path, 1.0, shift_nm=shift), Steps(shares, torques, widths), place, spread)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
-    other = positions_in_gap(Drive(path, 1.0, shift_nm=shift), Steps(shares, torques, 1.01 * width, narrow), place, spread)
+    other = positions_in_gap(Drive(path, 1.0, shift_nm=shift), Steps(shares, torques, (1.01 * widths[0], *widths[1:])), place, spread)
     assert np.abs(other - expected).max() > 1e-4

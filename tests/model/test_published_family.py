@@ -22,9 +22,9 @@ from backdrive_bayes.model.published import PublishedLoop
 LOOP = PublishedLoop(0.004, 0.21, 3.0, 40.0, 0.006, 130.0, 0.9, 5e-4)
 SATURATING = {
     "clearance": 0.012, "drag_torque": 0.006, "engagement_torque": 0.004, "release_share": 0.0,
-    "release_torque": 0.003, "release_width_ratio": 1.0, "late_share": 0.0, "late_drag_ratio": 1.5,
+    "release_torque": 0.003, "release_width_ratio": 1.0, "late_share": 0.0, "late_drag_ratio": 1.5, "late_width_ratio": 1.0,
     "initial_gap_position": 0.4, "initial_gap_spread": 0.0, "compliance": 0.15, "hardening_ratio": 1.0, "hardening_torque": 0.04,
-    "friction_torque": 0.003, "friction_ratio": 1e-300, "friction_spread": 0.05, "free_share": 0.25,
+    "friction_torque": 0.003, "friction_ratio": 1e-300, "friction_spread": 0.05, "load_spread": 0.05, "free_share": 0.25,
     "initial_friction_state": -0.5,
 }  # fmt: skip
 

@@ -26,6 +26,7 @@ class SecondBacklash:
 
     def respond(self, values, drive):
         """Angle [rad], shape (…, samples)."""
-        steps = Steps((1.0, 0.0, 0.0), (values["second_drag_torque"], 0.0, 0.0), values["second_engagement_torque"])
+        drag, width = values["second_drag_torque"], values["second_engagement_torque"]
+        steps = Steps((1.0, 0.0, 0.0), (drag, 0.0, 0.0), (width, 1.0, 1.0))
         place = 0.5 * (1 + values["initial_second_gap_position"])
         return 0.5 * values["second_clearance"] * positions_in_gap(drive, steps, place)
