@@ -58,7 +58,7 @@ def ours(problem, optimum, seconds=20.0):
     # Without thinning, so that nothing the sampler has drawn is thrown away.
     settings = Settings(kept_per_ensemble=10**6, refits=1)
     began = time.perf_counter()
-    chains = begin_ensembles(problem.log_posterior, proposal, rng, settings)
+    chains = begin_ensembles(problem.log_posterior, proposal, rng, settings, lambda: 1e9)
     drawn = run_ensembles(
         problem.log_posterior, chains, rng, settings, lambda e: False, lambda: began + seconds - time.perf_counter()
     )

@@ -24,22 +24,23 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Convergence:
-    """R-hat and ESS of every quantity by name, and the outcome."""
+    """R-hat and ESS of every quantity by name, whether the chains were burnt in, and the outcome."""
 
     names: tuple[str, ...]
     rhat: np.ndarray
     bulk_ess: np.ndarray
     tail_ess: np.ndarray
     seconds: float
+    burnt_in: bool = True
 
     @property
     def outcome(self) -> Outcome:
-        """Whether every quantity passes."""
+        """Whether every quantity passes, in chains that were burnt in."""
         # A quantity that is the same in all draws has no R-hat and nothing left to learn.
         fine = np.isnan(self.rhat) | (
             (self.rhat < MAX_RHAT) & (self.bulk_ess >= MIN_ESS) & (self.tail_ess >= MIN_ESS)
         )
-        return Outcome.CONVERGED if fine.all() else Outcome.NOT_CONVERGED
+        return Outcome.CONVERGED if fine.all() and self.burnt_in else Outcome.NOT_CONVERGED
 
     def joined(self, other: Convergence) -> Convergence:
         """Both sets of quantities as one."""
@@ -49,6 +50,7 @@ class Convergence:
             np.concatenate([self.bulk_ess, other.bulk_ess]),
             np.concatenate([self.tail_ess, other.tail_ess]),
             other.seconds,
+            self.burnt_in and other.burnt_in,
         )
 
     @property

@@ -208,7 +208,7 @@ def _fit(unit, baseline, seed, settings, quantities, scale, resume, progress) ->
     def enough(drawn: Ensembles) -> bool:
         seconds = before + time.perf_counter() - began
         state["weights"] = _draw_weights(problem, discrepancy, drawn, seed)
-        convergence = diagnose_draws(problem.labels, drawn.z, drawn.step, seconds)
+        convergence = replace(diagnose_draws(problem.labels, drawn.z, drawn.step, seconds), burnt_in=drawn.burnt_in)
         if convergence.outcome is Outcome.CONVERGED and quantities is not None:
             names, values = _quantity_draws(problem, discrepancy, drawn, state["weights"], quantities)
             convergence = convergence.joined(diagnose_draws(names, values, drawn.step, seconds))
@@ -230,7 +230,7 @@ def _begun(prepared, rng, settings, seconds_left):
             break
         restarts.append(best)
         prepared = _from_better_mode(prepared, best)
-    chains = begin_ensembles(prepared.problem.log_posterior, proposal, rng, settings)
+    chains = begin_ensembles(prepared.problem.log_posterior, proposal, rng, settings, seconds_left)
     return prepared, chains, np.reshape(restarts, (-1, prepared.problem.dimension))
 
 

@@ -64,11 +64,16 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Ensembles at work: emcee's samplers, the proposal they move by, and how often it may still be refitted."""
+    """Ensembles at work: emcee's samplers, the proposal they move by, and how often it may still be refitted.
+
+    ``burnt_in`` is whether there was time for the whole burn-in.
+    """
 
     samplers: tuple[emcee.EnsembleSampler, ...]
     proposal: StudentMixture
     refits_left: int
+    burnt_in: bool = True
+
 
 @dataclass(frozen=True, eq=False)
 class Ensembles:
@@ -82,6 +87,7 @@ class Ensembles:
     step: np.ndarray
     acceptance: float
     steps: int
+    burnt_in: bool = True
     chains: Chains | None = None
 
 
@@ -116,11 +122,11 @@ def _starts(log_posterior, proposal, rng, walkers):
     return z[picked], z[np.argmax(value)]
 
 
-def begin_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settings) -> Chains:
+def begin_ensembles(log_posterior, proposal: StudentMixture, rng, settings: Settings, seconds_left) -> Chains:
     """Independent ensembles with their burn-in behind them."""
     walkers = _walkers(settings, proposal.mean.shape[1])
     starts = [_starts(log_posterior, proposal, rng, walkers)[0] for _ in range(settings.ensembles)]
-    return _begin(log_posterior, proposal, starts, settings.refits, rng, settings)
+    return _begin(log_posterior, proposal, starts, settings.refits, rng, settings, seconds_left)
 
 
 def run_ensembles(log_posterior, chains: Chains, rng, settings: Settings, enough, seconds_left) -> Ensembles:
@@ -134,18 +140,20 @@ def run_ensembles(log_posterior, chains: Chains, rng, settings: Settings, enough
         began = time.perf_counter()
         for sampler in chains.samplers:
             sampler.run_mcmc(None, steps, skip_initial_state_check=True)
-        drawn = _collect(chains.samplers, settings.kept_per_ensemble)
+        drawn = replace(_collect(chains.samplers, settings.kept_per_ensemble), burnt_in=chains.burnt_in)
         if enough(drawn):
             return drawn
         if seconds_left() <= 0:
             return replace(drawn, chains=chains)
         affordable = int(seconds_left() * steps / (time.perf_counter() - began))
         steps = max(10, min(max(steps, drawn.steps // 2), affordable))
-        chains = _refitted(log_posterior, chains, rng, settings)
+        chains = _refitted(log_posterior, chains, rng, settings, seconds_left)
 
 
-def _refitted(log_posterior, chains, rng, settings):
-    """The same chains, or new ones from where they stand with a proposal that is clearly better."""
+def _refitted(log_posterior, chains, rng, settings, seconds_left):
+    """The same chains, or new ones from where they stand: with a proposal that is clearly better, or for want of burn-in."""
+    if not chains.burnt_in:
+        return _begin_again(log_posterior, chains, chains.proposal, chains.refits_left, rng, settings, seconds_left)
     flat = [s.get_chain(flat=True) for s in chains.samplers]
     held_out = np.concatenate(flat[1::2] or flat)
     held_out = held_out[:: max(1, held_out.shape[0] // 3000)]
@@ -153,23 +161,31 @@ def _refitted(log_posterior, chains, rng, settings):
     # How likely the proposal finds the chain's own draws tells of regions that it misses; importance weights cannot.
     if not chains.refits_left or score <= float(np.mean(chains.proposal.log_density(held_out))) + WORTHWHILE:
         return chains
+    return _begin_again(log_posterior, chains, better, chains.refits_left - 1, rng, settings, seconds_left)
+
+
+def _begin_again(log_posterior, chains, proposal, refits_left, rng, settings, seconds_left):
+    """New chains from where the old ones stand."""
     states = [s.get_last_sample() for s in chains.samplers]
-    return _begin(log_posterior, better, states, chains.refits_left - 1, rng, settings)
+    return _begin(log_posterior, proposal, states, refits_left, rng, settings, seconds_left)
 
 
-def _begin(log_posterior, proposal, states, refits_left, rng, settings):
-    """Fresh samplers with their burn-in behind them."""
+def _begin(log_posterior, proposal, states, refits_left, rng, settings, seconds_left):
+    """Fresh samplers with their burn-in behind them, or as much of it as there is time for."""
     dimension = proposal.mean.shape[1]
     samplers = tuple(_sampler(_walkers(settings, dimension), dimension, log_posterior, _moves(proposal), rng) for _ in states)
+    burnt_in = True
     for sampler, state in zip(samplers, states, strict=True):
         state = sampler.run_mcmc(state, settings.block // 2, skip_initial_state_check=True)
         # All ensembles start from the same approximation, so that R-hat cannot see a walker that has not left it yet.
         moves = settings.block // 2 * max(float(sampler.acceptance_fraction.mean()), 1e-3)
-        rest = int(np.ceil((settings.burn_in_moves / moves - 1) * (settings.block // 2)))
-        if rest > 0:
-            sampler.run_mcmc(state, min(rest, settings.longest_burn_in), skip_initial_state_check=True)
+        rest = min(int(np.ceil((settings.burn_in_moves / moves - 1) * (settings.block // 2))), settings.longest_burn_in)
+        while rest > 0 and seconds_left() > 0:
+            state = sampler.run_mcmc(state, min(rest, settings.block // 2), skip_initial_state_check=True)
+            rest -= settings.block // 2
+        burnt_in = burnt_in and rest <= 0
         sampler.reset()
-    return Chains(samplers, proposal, refits_left)
+    return Chains(samplers, proposal, refits_left, burnt_in)
 
 
 def _moves(proposal):
@@ -212,7 +228,7 @@ def save_chains(chains: Chains, path: Path) -> None:
             group.attrs.update({f"random_state_{i}": part for i, part in enumerate(drawn.random_state)})
             group.attrs["iteration"] = drawn.iteration
     with h5py.File(path, "a") as file:
-        file.attrs.update(ensembles=len(chains.samplers), refits_left=chains.refits_left)
+        file.attrs.update(ensembles=len(chains.samplers), refits_left=chains.refits_left, burnt_in=chains.burnt_in)
         file.create_group("proposal").update(vars(chains.proposal))
 
 
@@ -221,11 +237,12 @@ def load_chains(path: Path, log_posterior) -> Chains:
     with h5py.File(path) as file:
         proposal = StudentMixture(**{name: part[()] for name, part in file["proposal"].items()})
         count, refits_left = int(file.attrs["ensembles"]), int(file.attrs["refits_left"])
+        burnt_in = bool(file.attrs["burnt_in"])
     backends = [_in_memory(HDFBackend(path, name=f"ensemble_{k}", read_only=True)) for k in range(count)]
     samplers = [
         emcee.EnsembleSampler(*b.shape, log_posterior, moves=_moves(proposal), vectorize=True, backend=b) for b in backends
     ]
-    return Chains(tuple(samplers), proposal, refits_left)
+    return Chains(tuple(samplers), proposal, refits_left, burnt_in)
 
 
 def _in_memory(kept: HDFBackend) -> Backend:

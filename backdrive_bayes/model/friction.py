@@ -23,8 +23,8 @@ CONSTANT_SHARES = np.r_[0.0, np.geomspace(0.002, 1.6, 17)]
 class Friction:
     """Torque that reaches the elastic parts: a distribution of play operators (Prandtl-Ishlinskii).
 
-    An element holds until the torque has moved by r + m|τ| away from it. r and m are independent and log-normal with
-    means ``friction_torque`` and ``friction_ratio`` and log-sds ``friction_spread`` and ``load_spread``, carried by mean-preserving
+    An element holds until the torque has moved by r + m|τ| away from it. r and m are independent and log-normal with means
+    ``friction_torque`` and ``friction_ratio`` and log-sds ``friction_spread`` and ``load_spread``, carried by mean-preserving
     hat weights on a fixed grid; ``free_share`` of the torque passes without friction. On saturated branches of a linear
     elastic unit this is the constant ∓d₀ of eq. (20), reconstructed, plus a part that grows with the load.
     """

@@ -1,5 +1,7 @@
 """Diagnostics over ensembles: independent draws pass, each kind of trouble is flagged."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,13 @@ def independent(seed=0, quantities=3):
 
 def outcome(draws):
     return diagnose_draws([f"q{k}" for k in range(draws.shape[-1])], draws, STEP, 1.0).outcome
+
+
+def test_draws_without_their_burn_in_have_not_converged():
+    passed = diagnose_draws(["a", "b", "c"], independent(), STEP, 1.0)
+    assert passed.outcome is Outcome.CONVERGED
+    cut = replace(passed, burnt_in=False)
+    assert cut.outcome is Outcome.NOT_CONVERGED and cut.joined(passed).outcome is Outcome.NOT_CONVERGED
 
 
 def shifted_ensemble(draws):

@@ -96,7 +96,7 @@ def run(seed, walkers=WALKERS):
     )
     proposal, best = warm_up(Banana.log_posterior, Banana.mean, np.diag(Banana.sd**2), rng, settings, lambda: 1e9)
     assert Banana.log_posterior(best)[0] > Banana.log_posterior(Banana.mean)[0] - 5
-    chains = begin_ensembles(Banana.log_posterior, proposal, rng, settings)
+    chains = begin_ensembles(Banana.log_posterior, proposal, rng, settings, lambda: 1e9)
     return run_ensembles(
         Banana.log_posterior, chains, rng, settings, lambda drawn: drawn.steps >= 700, lambda: 1e9
     )
@@ -132,9 +132,18 @@ def test_a_seed_fixes_every_draw_and_kept_draws_are_bounded():
 
     def once(seed):
         rng = np.random.default_rng(seed)
-        chains = begin_ensembles(Banana.log_posterior, RIDGE, rng, settings)
+        chains = begin_ensembles(Banana.log_posterior, RIDGE, rng, settings, lambda: 0.0)
         return run_ensembles(Banana.log_posterior, chains, rng, settings, lambda d: False, lambda: 0.0)
 
     a, b, c = once(5), once(5), once(6)
     assert np.array_equal(a.z, b.z) and not np.array_equal(a.z, c.z)
     assert a.z.shape[1] <= 100
+
+
+def test_a_burn_in_that_was_cut_short_is_told_and_made_up_for():
+    settings, rng = Settings(ensembles=2, walkers=16, block=20, burn_in_moves=1000.0), np.random.default_rng(5)
+    cut = begin_ensembles(Banana.log_posterior, RIDGE, rng, settings, lambda: 0.0)
+    drawn = run_ensembles(Banana.log_posterior, cut, rng, settings, lambda d: True, lambda: 0.0)
+    assert not cut.burnt_in and not drawn.burnt_in
+    later = run_ensembles(Banana.log_posterior, cut, rng, settings, lambda d: d.burnt_in, lambda: 1e9)
+    assert later.burnt_in

@@ -36,5 +36,6 @@ def test_gap_is_the_play_operator_between_its_boundaries(seed):
     expected = middle + spread * (below + place * (above - below) - middle)
     found = positions_in_gap(Drive(path, 1.0, shift_nm=shift), Steps(shares, torques, widths), place, spread)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
-    other = positions_in_gap(Drive(path, 1.0, shift_nm=shift), Steps(shares, torques, (1.01 * widths[0], *widths[1:])), place, spread)
+    wider = Steps(shares, torques, (1.01 * widths[0], *widths[1:]))
+    other = positions_in_gap(Drive(path, 1.0, shift_nm=shift), wider, place, spread)
     assert np.abs(other - expected).max() > 1e-4
