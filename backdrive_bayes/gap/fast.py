@@ -16,6 +16,8 @@ ENCODER_ERROR, STICK_SLIP, VIBRATION = "encoder_error", "stick_slip", "vibration
 AMPLITUDES = (0.3, 1.0, 3.0, 10.0)
 """Prior standard deviations of a fast component, in those of the noise."""
 SINE_AMPLITUDES = np.geomspace(0.05, 20.0, 24)
+COHERENCE = 8.0
+"""Log evidence of a sine of the angle counts up to so many times the part of it that a phase common to all legs brings."""
 PERIODS = 160
 HARMONICS = 3
 HIGHEST_LINE = 0.95
@@ -56,22 +58,37 @@ def _torque_periods(setting):
 
 
 def _sine_of_angle(setting, legs, periods):
-    """Log evidence of a sine of the angle read, of one amplitude in all records and a phase of each; and its period."""
+    """Log evidence of a sine of the angle read, of one amplitude in all records and a phase of each; and its period.
+
+    What a model leaves swings along every leg as well, but with no phase in common: an encoder's error must be the more evident
+    for the legs of a record sharing one.
+    """
     amplitude = setting.noise_rad * SINE_AMPLITUDES[:, None]
-    total = np.zeros((SINE_AMPLITUDES.size, periods.size))
+    shared, apart = np.zeros((2, SINE_AMPLITUDES.size, periods.size))
     for record in {leg.record for leg in legs}:
         energy, load = np.zeros(periods.size), np.zeros((periods.size, 2))
         for leg in (leg for leg in legs if leg.record == record):
             turn = 2 * np.pi * leg.angle_rad[:, None] / periods
             white = leg.white(np.concatenate([np.cos(turn), np.sin(turn)], axis=1))
-            energy += 0.5 * np.sum(white**2, axis=0).reshape(2, -1).sum(axis=0)
-            load += (leg.residual @ white).reshape(2, -1).T
-        pull = amplitude * np.hypot(*load.T)
-        # The phase integrated: the mean of exp(pull cos φ) is the Bessel function I0.
-        total += np.log(ive(0, pull)) + pull - 0.5 * amplitude**2 * energy
-    best = periods[int(np.argmax(total.max(axis=0)))]
-    top = total.max()
-    return float(top + np.log(np.mean(np.exp(total - top)))), float(best)
+            own_energy = 0.5 * np.sum(white**2, axis=0).reshape(2, -1).sum(axis=0)
+            own_load = (leg.residual @ white).reshape(2, -1).T
+            apart += _any_phase(amplitude, own_load, own_energy)
+            energy, load = energy + own_energy, load + own_load
+        shared += _any_phase(amplitude, load, energy)
+    best = periods[int(np.argmax(shared.max(axis=0)))]
+    together, alone = _averaged(shared), _averaged(apart)
+    return min(together, COHERENCE * (together - alone)), float(best)
+
+
+def _any_phase(amplitude, load, energy):
+    # The phase integrated: the mean of exp(pull cos φ) is the Bessel function I0.
+    pull = amplitude * np.hypot(*load.T)
+    return np.log(ive(0, pull)) + pull - 0.5 * amplitude**2 * energy
+
+
+def _averaged(values) -> float:
+    top = values.max()
+    return float(top + np.log(np.mean(np.exp(values - top))))
 
 
 def _saw_columns(leg: FineLeg, period):
@@ -143,6 +160,4 @@ def _saw_of_torque(setting, legs, periods):
             gain = np.einsum("pi,pi->p", load, np.linalg.solve(inner, load[..., None])[..., 0])
             spread = np.linalg.slogdet(inner)[1] + 2 * gram.shape[-1] * np.log(amplitude * setting.noise_rad)
             total[a] += 0.5 * (gain - spread)
-    best = periods[int(np.argmax(total.max(axis=0)))]
-    top = total.max()
-    return float(top + np.log(np.mean(np.exp(total - top)))), float(best)
+    return _averaged(total), float(periods[int(np.argmax(total.max(axis=0)))])
