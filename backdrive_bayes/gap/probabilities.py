@@ -7,6 +7,7 @@ on simulated units of a virtual bench that shares no formula with the models (st
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.special import logsumexp
 
 from backdrive_bayes.gap.candidates import Candidates
 from backdrive_bayes.gap.fast import STICK_SLIP, VIBRATION, Fast
+from backdrive_bayes.model.registry import BASELINE
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,8 @@ class Calibration:
     ``unknown`` is the weight of something else instead of any effect, ``remainder`` of something else beside the best one.
     ``imprint`` multiplies the temperature of slow evidences beside stick-slip, whose jumps leave traces in wide blocks that no
     slow model explains; ``triple`` is the share left to three effects at once, or to fast
-    structure with something unknown beside it.
+    structure with something unknown beside it. ``module`` is how much likelier than an effect a module is that every reducer has
+    and the baseline was asked to do without.
     """
 
     temperature: float = 7.5
@@ -36,6 +39,7 @@ class Calibration:
     fast: float = 0.1
     imprint: float = 3.4
     triple: float = 0.02
+    module: float = 20.0
     misfit: tuple[float, ...] = (0.5, 0.26, 0.13, 0.07, 0.04)
     unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
 
@@ -93,17 +97,26 @@ def _union(effects, fast):
 
 def _slow(evidences, c, temperature):
     misfit = np.log(c.misfit)
-    singles = sum(len(effects) == 1 for effects in evidences.slow)
-    share = {0: c.none, 1: c.single / max(singles, 1), 2: c.pair / max(singles * (singles - 1) / 2, 1)}
+    share = _prior([effects[0] for effects in evidences.slow if len(effects) == 1], c)
     score = {
-        effects: np.log(share[len(effects)]) + logsumexp(values + misfit) / temperature
-        for effects, values in evidences.slow.items()
+        effects: np.log(share(effects)) + logsumexp(values + misfit) / temperature for effects, values in evidences.slow.items()
     }
     kinds = np.log(np.array(c.unknown_level)[None, None, :] / evidences.unexplained.shape[1])
     alone, beside = logsumexp(evidences.unexplained + kinds, axis=(1, 2)) / temperature
     # What the best effect leaves is mostly the error of its formula and of the baseline's.
     score[UNKNOWN] = np.logaddexp(np.log(c.unknown) + alone, np.log(c.remainder) + beside)
     return _normalised(score)
+
+
+def _prior(names, c):
+    """Prior weight of none, of one effect or of two, as a function of them."""
+
+    def odds(effects):
+        return np.prod([c.module if name in BASELINE else 1.0 for name in effects])
+
+    singles, pairs = (sum(odds(chosen) for chosen in itertools.combinations(names, n)) for n in (1, 2))
+    total, size = (1.0, max(singles, 1.0), max(pairs, 1.0)), (c.none, c.single, c.pair)
+    return lambda effects: size[len(effects)] * odds(effects) / total[len(effects)]
 
 
 def _fast(fast, c):

@@ -43,6 +43,12 @@ def test_a_strong_effect_is_named_and_a_stronger_rest_is_unknown():
     assert rest["unknown"] > 0.9
 
 
+def test_a_module_that_every_reducer_has_comes_first():
+    named = labels(candidates(geometric=60.0, sensor_lag=65.0))
+    assert named["geometric"] > 3 * named["sensor_lag"]
+    assert labels(candidates(geometric=60.0, sensor_lag=120.0))["sensor_lag"] > 0.9
+
+
 def test_a_pair_must_earn_its_place():
     close = labels(candidates(sensor_lag=100.0, thermal_drift=0.0, sensor_lag__thermal_drift=103.0))
     far = labels(candidates(sensor_lag=100.0, thermal_drift=0.0, sensor_lag__thermal_drift=200.0))
