@@ -37,6 +37,8 @@ from backdrive_bayes.model.registry import BASELINE
 
 SEED = 77
 SEVERITIES = (1.0, 0.4, 0.2, 0.1)
+DIRT = (0.5, 3.0)
+"""Level of the small faults that every bench has, from cleaner than usual to dirtier."""
 
 
 def weigh(job) -> dict:
@@ -44,7 +46,7 @@ def weigh(job) -> dict:
     warnings.simplefilter("ignore")
     index, effects = job
     rng = np.random.default_rng([SEED, index])
-    bench = draw_unit(rng, effects, plan=draw_plan(Request(1), rng))
+    bench = draw_unit(rng, effects, plan=draw_plan(Request(1), rng), dirt=float(rng.uniform(*DIRT)))
     began, rng = time.perf_counter(), np.random.default_rng(0)
     setting = Setting.of(bench.unit, rng, BASELINE)
     candidates = weigh_all(setting, rng)

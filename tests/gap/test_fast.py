@@ -19,7 +19,8 @@ def legs(rng, amplitude, phases):
         angle = np.linspace(-0.02, 0.02, BLOCKS) * (-1) ** k
         error = amplitude * np.sin(2 * np.pi * angle / PERIOD + phase)
         residual = error / NOISE + rng.standard_normal(BLOCKS)
-        made.append(FineLeg(k // 3, np.abs(angle - angle[0]), angle, np.arange(BLOCKS), (-1) ** k, NOISE * np.eye(BLOCKS), residual))
+        way, lower = np.abs(angle - angle[0]), NOISE * np.eye(BLOCKS)
+        made.append(FineLeg(k // 3, way, angle, np.arange(BLOCKS), (-1) ** k, lower, residual))
     return made
 
 

@@ -32,7 +32,7 @@ class EncoderError(Effect):
 
 
 def draw(rng, reducer):
-    """Five to twenty periods in the measured range."""
+    """Five to sixty-odd periods in the measured range."""
     variant = rng.integers(3)
     harmonic, sharpness = (rng.uniform(0.2, 0.5) if variant == 1 else 0.0), (rng.uniform(0.5, 0.8) if variant == 2 else 0.0)
-    return EncoderError(0.0, log_uniform(rng, 0.1, 0.4), rng.uniform(0, 2 * np.pi), harmonic, sharpness)
+    return EncoderError(0.0, log_uniform(rng, 0.03, 0.4), rng.uniform(0, 2 * np.pi), harmonic, sharpness)
