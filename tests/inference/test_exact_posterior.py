@@ -81,9 +81,9 @@ def curvature_bias(blocks_per_segment, corrected=True):
 
 def test_reduced_posterior_agrees_with_the_exact_one(exact):
     shift, spread = disagreement(exact, problem_of(exact[0], NOISE))
-    # Blocks lose some of the information, most of it (a tenth of the sd) along the shape of the step, which moves the mean by the
+    # Blocks lose some of the information, most of it (a twentieth of the sd) along the shape of the step, which moves the mean by the
     # square root of that at most.
-    assert spread < 0.12
+    assert spread < 0.08
     assert shift < 0.45
 
 
@@ -95,7 +95,7 @@ def test_finer_blocks_agree_better(exact):
 
 def test_too_few_blocks_are_noticed(exact):
     shift, spread = disagreement(exact, problem_of(exact[0], NOISE, blocks_per_segment=15))
-    assert shift > 0.45 and spread > 0.12
+    assert shift > 0.45 and spread > 0.08
 
 
 def test_independent_blocks_are_noticed(exact):
@@ -110,7 +110,7 @@ def test_independent_blocks_are_noticed(exact):
     assert disagreement(exact, naive)[1] > 0.08
 
 
-@pytest.mark.parametrize("blocks_per_segment", [120, 400])
+@pytest.mark.parametrize("blocks_per_segment", [50, 120, 200])
 def test_block_averages_bring_no_bias(blocks_per_segment):
     assert curvature_bias(blocks_per_segment) < 0.1
 
