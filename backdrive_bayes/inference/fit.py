@@ -91,7 +91,7 @@ def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, bloc
     scale = scale or Scale(unit.rated_torque_nm, angle_scale_rad(unit))
     model = ReducerModel(members_named(baseline), scale)
     # A loop from rest has two and a half legs.
-    blocks_per_segment = blocks_per_segment or int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 50, 120))
+    blocks_per_segment = blocks_per_segment or int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 60, 120))
     segments = [find_segments(r.time_s, r.torque_nm) for r in unit.records]
     noise = estimate_common_noise(
         [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, s) for r, s in zip(unit.records, segments, strict=True)]

@@ -110,7 +110,7 @@ def test_independent_blocks_are_noticed(exact):
     assert disagreement(exact, naive)[1] > 0.08
 
 
-@pytest.mark.parametrize("blocks_per_segment", [50, 120, 200])
+@pytest.mark.parametrize("blocks_per_segment", [60, 120, 200])
 def test_block_averages_bring_no_bias(blocks_per_segment):
     assert curvature_bias(blocks_per_segment) < 0.1
 
