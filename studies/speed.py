@@ -31,6 +31,7 @@ from backdrive_bayes.indicators.summary import indicators_json, monitored
 from backdrive_bayes.inference.fit import fit, prepare
 from backdrive_bayes.inference.problem import path_of
 from backdrive_bayes.inference.sampling import Settings, begin_ensembles, run_ensembles, warm_up
+from backdrive_bayes.inference.starts import along_ridges
 from backdrive_bayes.model.path import Leg, TorquePath
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.unit_folder import read_unit
@@ -53,7 +54,8 @@ def ours(problem, optimum, seconds=20.0):
     """Warm-up and sampling of this package until the time is up: ESS per second with and without warm-up."""
     rng = np.random.default_rng(0)
     began = time.perf_counter()
-    proposal, _ = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, Settings(), lambda: 1e9)
+    starts = along_ridges(problem, optimum.z, rng)
+    proposal, _ = warm_up(problem.log_posterior, optimum.z, optimum.covariance, starts, rng, Settings(), lambda: 1e9)
     warm = time.perf_counter() - began
     # Without thinning, so that nothing the sampler has drawn is thrown away.
     settings = Settings(kept_per_ensemble=10**6, refits=1)

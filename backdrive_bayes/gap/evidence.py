@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
 
-FORMULA_ERRORS = (0.03, 0.2)
+FORMULA_ERRORS = (0.03, 0.2, 0.6)
 """Standard deviations by which an effect's contribution may differ from its formula, relative to the contribution."""
 FORMULA_LENGTH = 0.06
 
@@ -28,7 +28,8 @@ def log_evidence(setting: Setting, fitted: Fitted, *terms) -> float:
     if not fitted.contributions:
         return _gaussian(setting, fitted, base)
     shape = formula_error(setting, fitted)
-    return float(logsumexp([_gaussian(setting, fitted, base + level**2 * shape) for level in FORMULA_ERRORS], b=1 / 2))
+    values = [_gaussian(setting, fitted, base + level**2 * shape) for level in FORMULA_ERRORS]
+    return float(logsumexp(values, b=1 / len(values)))
 
 
 def _gaussian(setting, fitted, covariance):

@@ -20,6 +20,8 @@ COHERENCE = 8.0
 """Log evidence of a sine of the angle counts up to so many times the part of it that a phase common to all legs brings."""
 PERIODS = 160
 HARMONICS = 3
+HARMLESS = 0.3
+"""Amplitude of a vibration that every rig has, in standard deviations of the angle's noise."""
 HIGHEST_LINE = 0.95
 """Share of the Nyquist frequency: quanta beat with the sampling just below it."""
 PIECE = 60
@@ -117,13 +119,15 @@ def _lines(setting, fitted):
     """Log evidence of a line in the spectrum of the angle at full sampling rate, the same in all records, and its period [s].
 
     An ordinate of the periodogram over the level of its neighbours is exponential under noise; over a line of unknown
-    amplitude its evidence is about exp(excess) over the number of frequencies tried.
+    amplitude its evidence is about exp(excess) over the number of frequencies tried. What a harmless vibration brings is no
+    evidence.
     """
     frequencies, total = None, 0.0
     for r, record in enumerate(setting.unit.records):
         data = fitted.problem.records[r]
         smooth = np.interp(record.time_s, data.blocks.mid_s, data.blocks.angle_rad)
-        ratio, frequency = _spectrum_ratio(record.time_s, record.angle_rad - smooth)
+        harmless = HARMLESS * float(np.hypot(data.noise.correlated_rad, data.noise.white_rad))
+        ratio, frequency = _spectrum_ratio(record.time_s, record.angle_rad - smooth, harmless)
         if frequencies is None:
             frequencies = frequency
         nearest = np.searchsorted(frequency, frequencies).clip(1, frequency.size - 2)
@@ -137,15 +141,20 @@ def _lines(setting, fitted):
     return float(total[best] - np.log(frequencies.size) - tail - 3.0), float(1 / frequencies[best])
 
 
-def _spectrum_ratio(time, residual):
-    """Periodogram over its running median, and frequencies [Hz], without the two hundred lowest and the highest."""
+def _spectrum_ratio(time, residual, harmless):
+    """Periodogram over its running median, and frequencies [Hz], without the two hundred lowest and the highest.
+
+    From each ordinate's root that of a line of amplitude ``harmless`` [rad] is taken.
+    """
     step = float(np.median(np.diff(time)))
     taper = np.hanning(residual.size)
     power = np.abs(np.fft.rfft((residual - residual.mean()) * taper)) ** 2
     frequency = np.fft.rfftfreq(residual.size, step)
     level = median_filter(power, 101, mode="nearest") / np.log(2.0)
     keep = slice(min(200, power.size // 4), int(HIGHEST_LINE * power.size))
-    return power[keep] / np.maximum(level[keep], 1e-300), frequency[keep]
+    line = 0.5 * harmless * taper.sum()
+    root = np.maximum(np.sqrt(power[keep]) - line, 0.0)
+    return root**2 / np.maximum(level[keep], 1e-300), frequency[keep]
 
 
 def _saw_of_torque(setting, legs, periods):

@@ -26,10 +26,11 @@ class Calibration:
     ``imprint`` multiplies the temperature of slow evidences beside stick-slip, whose jumps leave traces in wide blocks that no
     slow model explains; ``triple`` is the share left to three effects at once, or to fast
     structure with something unknown beside it. ``module`` is how much likelier than an effect a module is that every reducer has
-    and the baseline was asked to do without.
+    and the baseline was asked to do without. ``slack`` is the share of what effects explain that counts as their formulas' error
+    where something unknown explains more.
     """
 
-    temperature: float = 7.5
+    temperature: float = 6.0
     fast_temperature: float = 8.0
     none: float = 0.4
     single: float = 0.445
@@ -40,6 +41,7 @@ class Calibration:
     imprint: float = 3.4
     triple: float = 0.02
     module: float = 20.0
+    slack: float = 0.15
     misfit: tuple[float, ...] = (0.5, 0.26, 0.13, 0.07, 0.04)
     unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
 
@@ -102,7 +104,8 @@ def _slow(evidences, c, temperature):
         effects: np.log(share(effects)) + logsumexp(values + misfit) / temperature for effects, values in evidences.slow.items()
     }
     kinds = np.log(np.array(c.unknown_level)[None, None, :] / evidences.unexplained.shape[1])
-    alone, beside = logsumexp(evidences.unexplained + kinds, axis=(1, 2)) / temperature
+    explained = max(logsumexp(values + misfit) for values in evidences.slow.values()) - logsumexp(evidences.slow[NONE] + misfit)
+    alone, beside = (logsumexp(evidences.unexplained + kinds, axis=(1, 2)) - c.slack * explained) / temperature
     # What the best effect leaves is mostly the error of its formula and of the baseline's.
     score[UNKNOWN] = np.logaddexp(np.log(c.unknown) + alone, np.log(c.remainder) + beside)
     return _normalised(score)

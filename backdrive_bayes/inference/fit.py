@@ -16,7 +16,7 @@ from backdrive_bayes.inference.noise_refinement import refine_noise
 from backdrive_bayes.inference.optimum import Optimum, find_optimum
 from backdrive_bayes.inference.problem import Problem, RecordData
 from backdrive_bayes.inference.sampling import Ensembles, Settings, begin_ensembles, run_ensembles, warm_up
-from backdrive_bayes.inference.starts import feature_starts, scattered, screened_starts, with_other_pasts
+from backdrive_bayes.inference.starts import along_ridges, feature_starts, scattered, screened_starts, with_other_pasts
 from backdrive_bayes.model.parameter import Scale
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
@@ -225,7 +225,8 @@ def _begun(prepared, rng, settings, seconds_left):
     restarts = []
     for _ in range(3):
         problem, optimum = prepared.problem, prepared.optimum
-        proposal, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, rng, settings, seconds_left)
+        starts = along_ridges(problem, optimum.z, rng)
+        proposal, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, starts, rng, settings, seconds_left)
         if problem.log_posterior(best)[0] < optimum.log_posterior + BETTER_MODE:
             break
         restarts.append(best)

@@ -10,7 +10,7 @@ from scipy.special import gammaln, logsumexp
 DEGREES = 8.0
 BROAD_SHARE = 0.1
 BROAD_STRETCH = 2.0
-PARTS = (1, 4)
+PARTS = (1, 4, 12)
 
 
 @dataclass(frozen=True, eq=False)

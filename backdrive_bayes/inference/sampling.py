@@ -18,8 +18,13 @@ from emcee.moves import DEMove, Move
 
 from backdrive_bayes.inference.proposal import StudentMixture, best_mixture, importance, polish, temper
 
-WORTHWHILE = 0.5
+WORTHWHILE = 2.0
 """By how many nats a draw a refitted proposal must be better for the draws made so far to be given up."""
+
+JITTER = 0.1
+"""Posterior standard deviations by which walkers that set out from one point are set apart."""
+LEAST_BLOCKS = 2
+"""Blocks of differential evolution without which no proposal is believed: importance weights cannot see what it misses."""
 
 
 class IndependenceMove(Move):
@@ -51,10 +56,10 @@ class Settings:
     """How long and how widely to sample; the defaults fit one unit of up to eight records."""
 
     ensembles: int = 4
-    walkers: int = 160
+    walkers: int = 256
     block: int = 40
     warm_up_blocks: int = 6
-    refits: int = 3
+    refits: int = 2
     kept_per_ensemble: int = 1500
     burn_in_moves: float = 12.0
     longest_burn_in: int = 200
@@ -91,18 +96,22 @@ class Ensembles:
     chains: Chains | None = None
 
 
-def warm_up(log_posterior, mode, covariance, rng, settings: Settings, seconds_left):
-    """A proposal fitted to the posterior: by importance sampling where that works, else by differential evolution.
+def warm_up(log_posterior, mode, covariance, starts, rng, settings: Settings, seconds_left):
+    """A proposal fitted to the posterior by importance sampling and differential evolution.
 
-    Returns the proposal and the best point seen.
+    ``starts`` (points, dimension) lie spread over the posterior's ridges, which the Gaussian at ``mode`` may not reach: half of
+    the walkers set out from them. Returns the proposal and the best point seen.
     """
     proposal, share = polish(log_posterior, StudentMixture.single(mode, covariance), rng)
     walkers = _walkers(settings, mode.size)
     state, best = _starts(log_posterior, proposal, rng, walkers)
+    if len(starts):
+        state[::2] = starts[rng.integers(len(starts), size=len(state[::2]))]
+        state[::2] += JITTER * rng.standard_normal(state[::2].shape) * np.sqrt(np.diag(covariance))
     sampler = _sampler(walkers, mode.size, log_posterior, [(DEMove(), 0.9), (DEMove(gamma0=1.0), 0.1)], rng)
     history = []
-    for _ in range(settings.warm_up_blocks):
-        if share >= settings.good_share or seconds_left() <= 0:
+    for block in range(settings.warm_up_blocks):
+        if (block >= LEAST_BLOCKS and share >= settings.good_share) or seconds_left() <= 0:
             break
         sampler.reset()
         state = sampler.run_mcmc(state, settings.block, skip_initial_state_check=True)

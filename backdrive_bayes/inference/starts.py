@@ -6,11 +6,13 @@ import itertools
 
 import numpy as np
 
+from backdrive_bayes.inference.optimum import climb
 from backdrive_bayes.inference.problem import Problem
 
 GRID = 400
 SCATTER = 0.7
 """Prior standard deviations by which starts are scattered around a mode."""
+RIDGE_STARTS, RIDGE_STEPS = 64, 8
 HARDENING_RATIOS, RELEASE_SHARES = (1.0, 0.5), (0.05, 0.25)
 FEATURE_STARTS = len(HARDENING_RATIOS) * len(RELEASE_SHARES)
 
@@ -77,6 +79,19 @@ def scattered(z, rng, starts: int = 8) -> np.ndarray:
     noise = SCATTER * rng.standard_normal((starts, z.size))
     noise[0] = 0.0
     return z + noise
+
+
+def along_ridges(problem: Problem, z, rng) -> np.ndarray:
+    """Points spread over the posterior around its mode ``z``, shape (points, dimension).
+
+    Parameters that can stand in for each other make curved ridges, far longer than the mode's Gaussian: points scattered as
+    widely as the prior and climbed for a few steps lie all along them.
+    """
+    shared = [c.record is None for c in problem.coordinates]
+    starts = np.repeat(z[None], RIDGE_STARTS, axis=0)
+    starts[:, shared] += rng.standard_normal((RIDGE_STARTS, sum(shared)))
+    points, value = climb(problem, starts, RIDGE_STEPS)
+    return points[value > value.max() - problem.dimension]
 
 
 def with_other_pasts(problem: Problem, z, rng, tries: int = 128) -> np.ndarray:

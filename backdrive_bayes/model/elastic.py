@@ -24,7 +24,7 @@ class Elastic:
         Parameter("compliance", "rad/(N·m)", "compliance", LogNormal(0.6, 1.0), 0.0, STEEL_TO_PLASTIC),
         Parameter("hardening_ratio", "1", "none", LogNormal(1.0, 0.7), 1.0, "no preference for hardening or softening"),
         # A sharper bend would be a clearance without friction.
-        Parameter("hardening_torque", "N·m", "torque", LogUniform(0.03, 1.0), None, "bends within the rated range"),
+        Parameter("hardening_torque", "N·m", "torque", LogUniform(0.07, 1.0), None, "bends within the rated range"),
     )
 
     def respond(self, values, drive):

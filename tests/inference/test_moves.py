@@ -89,12 +89,15 @@ def test_wrong_move_is_found_out(move, truth):
     assert not agrees(sampled([(move, 1.0)], 400), *truth)
 
 
+NOWHERE = np.empty((0, Banana.mean.size))
+
+
 def run(seed, walkers=WALKERS):
     rng = np.random.default_rng(seed)
     settings = Settings(
         ensembles=ENSEMBLES, walkers=walkers, block=150, kept_per_ensemble=20_000, good_share=0.9
     )
-    proposal, best = warm_up(Banana.log_posterior, Banana.mean, np.diag(Banana.sd**2), rng, settings, lambda: 1e9)
+    proposal, best = warm_up(Banana.log_posterior, Banana.mean, np.diag(Banana.sd**2), NOWHERE, rng, settings, lambda: 1e9)
     assert Banana.log_posterior(best)[0] > Banana.log_posterior(Banana.mean)[0] - 5
     chains = begin_ensembles(Banana.log_posterior, proposal, rng, settings, lambda: 1e9)
     return run_ensembles(
