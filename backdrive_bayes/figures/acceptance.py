@@ -11,8 +11,8 @@ from backdrive_bayes.figures.style import (
     ORANGE,
     VERMILLION,
     display_unit,
+    drawn_words,
     few_ticks,
-    indicator_words,
     new_figure,
     styled,
 )
@@ -63,7 +63,7 @@ def _panel(panel, row):
     classic = row["naive"]["value"]
     if classic is not None and left <= classic * factor <= right:
         panel.plot(classic * factor, 0.06, linestyle="none", marker="x", color=BLACK, label="least squares")
-    panel.set(xlim=(left, right), ylim=(0, 1.12), yticks=[], xlabel=f"{indicator_words(row['indicator'])} [{unit or '–'}]")
+    panel.set(xlim=(left, right), ylim=(0, 1.12), yticks=[], xlabel=f"{drawn_words(row['indicator'])} [{unit or '–'}]")
     colour = {"accepted": GREEN, "rejected": VERMILLION}.get(row["verdict"], BLACK)
     predicted = ", predicted" if row["predicted"] else ""
     at = f"{row['loading_rate_Nm_per_s']:.2g} N·m/s, ±{row['amplitude_Nm']:.2g} N·m{predicted}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from backdrive_bayes.figures import (
@@ -19,7 +20,7 @@ from backdrive_bayes.figures import (
 from backdrive_bayes.figures.diagnosis_saved import FILE as DIAGNOSIS
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import PER_FIGURE, SERIES, Figure, styled
+from backdrive_bayes.figures.style import PER_FIGURE, SERIES, Figure, parts, styled
 from backdrive_bayes.results import COMPARISON, VERDICT, read_result
 
 CAPTIONS = {
@@ -40,9 +41,12 @@ CAPTIONS = {
 PNG_DPI = 150
 
 
-def caption(name: str) -> str:
-    """What a figure of :func:`all_figures` shows, in words."""
-    return next(text for kind, text in CAPTIONS.items() if name == kind or name.startswith(f"{kind}-"))
+def caption(name: str, level: float | None = None) -> str:
+    """What a figure of :func:`all_figures` shows, in words, with the level of its intervals; briefly where it is continued."""
+    kind, text = next((k, t) for k, t in CAPTIONS.items() if name == k or name.startswith(f"{k}-"))
+    if level:
+        text = re.sub(r"\b(and|with) (intervals?)\b", rf"\1 {100 * level:.3g} % \2", text)
+    return text if name == kind else f"{text.partition('. ')[0].rstrip('.')}, continued."
 
 
 def all_figures(folder: Path) -> dict[str, Figure]:
@@ -85,8 +89,7 @@ def comparison_figures(result: dict) -> dict[str, Figure]:
 
 
 def _split(name, draw, saved, records, at_most):
-    parts = [records[i : i + at_most] for i in range(0, len(records), at_most)]
-    return {name if i == 0 else f"{name}-{i + 1}": draw(saved, part) for i, part in enumerate(parts)}
+    return {name if i == 0 else f"{name}-{i + 1}": draw(saved, part) for i, part in enumerate(parts(records, at_most))}
 
 
 def save_figures(folder: Path, out: Path) -> list[Path]:

@@ -12,8 +12,8 @@ from backdrive_bayes.figures.style import (
     ORANGE,
     SERIES,
     SKY,
+    drawn_words,
     few_ticks,
-    indicator_words,
     new_figure,
     styled,
 )
@@ -84,7 +84,7 @@ def draw_ratios(comparison: dict, pair: int):
         panel.axvspan(1 / (1 + rope), 1 + rope, color=GREY, alpha=0.35, linewidth=0)
         panel.axvline(1.0, color="black", linewidth=0.7)
         panel.set(xscale="log", yticks=range(len(shown)), ylim=(len(shown) - 0.45, -0.55))
-        panel.set_yticklabels([indicator_words(name) for name in shown])
+        panel.set_yticklabels([drawn_words(name) for name in shown])
         panel.set_xlabel(f"ratio: {_short(both['first'])} over {_short(both['second'])} [–]")
         _plain_log(panel)
         figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=3)
@@ -105,7 +105,7 @@ def draw_mechanism(comparison: dict):
         left.axvline(1.0, color="black", linewidth=0.7)
         left.set(xlim=(0, max(1.0, left.get_xlim()[1])), xlabel="share of S [–]", ylim=(len(bars) - 0.5, -0.5))
         left.set_yticks(range(len(bars)), [f"{_short(name)}, {_condition(r)}" for name, r in bars])
-        right.set(xlim=(0, 1), xlabel="share of W_abs [–]")
+        right.set(xlim=(0, 1), xlabel="given back/absorbed [–]")
         handles = [*zip(*left.get_legend_handles_labels(), strict=True), *zip(*right.get_legend_handles_labels(), strict=True)]
         figure.legend([h for h, _ in handles], [n for _, n in handles], loc="outside lower center", ncols=3)
     return figure

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 
 from backdrive_bayes.figures import diagnosis_closed, diagnosis_map, diagnosis_residual, diagnosis_shift
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_which import bar_lines, draw_bars
 from backdrive_bayes.figures.diagnosis_words import answer_words, drawable
-from backdrive_bayes.figures.style import PER_FIGURE, Figure, new_figure, styled
+from backdrive_bayes.figures.style import PER_FIGURE, Figure, new_figure, parts, styled
 
 CAPTION = (
     "The diagnosis at a glance. Left: probability of each cause. Right: rms of the gap on held-out data before "
@@ -64,11 +63,7 @@ def _settle(figure):
 
 def _split(name, kind, saved, records, at_most):
     """Figures of nearly equal numbers of records."""
-    if not records:
-        return {}
-    size = math.ceil(len(records) / math.ceil(len(records) / at_most))
-    parts = [records[i : i + size] for i in range(0, len(records), size)]
-    return {name if i == 0 else f"{name}-{i + 1}": kind.draw(saved, part) for i, part in enumerate(parts)}
+    return {name if i == 0 else f"{name}-{i + 1}": kind.draw(saved, part) for i, part in enumerate(parts(records, at_most))}
 
 
 def draw(saved: Diagnosed):
@@ -76,7 +71,7 @@ def draw(saved: Diagnosed):
     row_in = diagnosis_map.row_height_in(saved, *ROW_IN)
     records = diagnosis_map.heaviest(saved, diagnosis_map.fitting(MAP_IN, row_in))
     row_in = diagnosis_map.row_height_in(saved, *ROW_IN, len(records))
-    lines = textwrap.wrap(drawable(saved.inconclusive or saved.where.get("summary") or "", 3 * _LINE - 6), _LINE)
+    lines = textwrap.wrap(drawable(saved.inconclusive or saved.summary, 3 * _LINE - 6), _LINE)
     held = len(diagnosis_closed.rows(saved, records)) if saved.shrink else 0
     heights = (
         0.32 + 0.17 * len(lines),

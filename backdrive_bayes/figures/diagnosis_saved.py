@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.figures.style import record_labels
+from backdrive_bayes.figures.style import in_words, record_labels
 from backdrive_bayes.results import DIAGNOSIS, read_result
 
 FILE = "diagnosis.json"
@@ -98,6 +98,11 @@ class Diagnosed:
     def where(self) -> dict:
         """Summary and map."""
         return self.result.get("where") or {}
+
+    @property
+    def summary(self) -> str:
+        """Where the gap lies, in words."""
+        return in_words(str(self.where.get("summary") or ""))
 
     @property
     def enlarged(self) -> bool:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from statistics import NormalDist
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import drawable, parameter_words, signed
+from backdrive_bayes.figures.diagnosis_words import FAR, drawable, parameter_words, signed
 from backdrive_bayes.figures.style import BLUE, VERMILLION, few_ticks, new_figure, styled
 
 CAPTION = (
     "Shift of the baseline's parameters when the effect is added, in each parameter's own standard deviations "
-    "(zero: median before). Open circles and dashed lines: median and interval before; filled squares: after. A "
-    "parameter that moves by several deviations had been standing in for the missing effect."
+    "(zero: median before; beyond ±1000 at the edge). Open circles and dashed lines: median and interval before; "
+    "filled squares: after. A parameter that moves by several deviations had been standing in for the missing effect."
 )
 AT_MOST = 14
 WIDE = 12.0
@@ -23,7 +22,7 @@ def draw(saved: Diagnosed):
     """Medians and intervals before and after [own standard deviations] of the parameters that move most."""
     shown = saved.shifts[:AT_MOST]
     with styled():
-        figure = new_figure(1.0 + 0.29 * len(shown))
+        figure = new_figure(1.0 + 0.25 * len(shown))
         axes = figure.subplots()
         axes.axvspan(-1, 1, color="#E4E4E4", linewidth=0, label="±1 standard deviation")
         far = 3.0
@@ -59,7 +58,8 @@ def _one(axes, y, shift, scale):
     )
     seen = []
     for key, at, look, marker, face in looks:
-        lo, median, hi = ((shift[key][k] - shift["before"]["median"]) / scale for k in ("lo", "median", "hi"))
+        away = ((shift[key][k] - shift["before"]["median"]) / scale for k in ("lo", "median", "hi"))
+        lo, median, hi = (min(max(x, -FAR), FAR) for x in away)
         axes.plot([lo, hi], [at, at], linewidth=1.5, **look)
         axes.plot(median, at, marker=marker, markersize=5, markerfacecolor=face, color=look["color"], linestyle="none", label=key)
         seen += [lo, median, hi]
@@ -72,7 +72,7 @@ def _scale(axes, far):
     few_ticks(axes, 10, 100)
     if far > WIDE:
         axes.set_xscale("symlog", linthresh=3, linscale=1)
-        steps = [3, 10, 30, 100] if far <= 150 else [10 ** (k + 1) for k in range(int(math.log10(far)))]
+        steps = [3, 10, 30, 100] if far <= 150 else [10, 100, 1000]
         ticks = [t for t in (*(-s for s in reversed(steps)), 0, *steps) if abs(t) <= far]
         axes.set_xticks(ticks, [str(t).replace("-", "−") for t in ticks])
         axes.minorticks_off()

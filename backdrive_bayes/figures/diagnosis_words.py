@@ -6,9 +6,11 @@ import unicodedata
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed, Hypothesis
 from backdrive_bayes.figures.fonts import uncovered
-from backdrive_bayes.figures.style import display_unit, words
+from backdrive_bayes.figures.style import words
 
 _INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
+FAR = 1000.0
+"""Standard deviations beyond which a shift is no longer told or drawn: the parameter was as good as fixed."""
 _GLOSS = {"unknown": "unknown (not listed)", "none": "none (no gap)"}
 
 
@@ -44,13 +46,6 @@ def parameter_words(saved: Diagnosed, name: str) -> str:
     return words(name)
 
 
-def shown_unit(unit: str, values) -> tuple[float, str]:
-    """Factor and name of the unit in which values saved in ``unit`` are shown; mN·m for small torques."""
-    if unit == "N·m" and max(abs(v) for v in values) < 0.1:
-        return 1e3, "mN·m"
-    return display_unit(unit)
-
-
 def own_of_a_record(name: str) -> bool:
     """Whether a parameter belongs to a single record, such as ``drift[1]``."""
     return name.endswith("]")
@@ -73,8 +68,10 @@ def share_text(interval: dict | None) -> str:
 
 
 def signed(value: float | None) -> str:
-    """A shift with its sign and one decimal."""
-    return "–" if value is None else f"{value:+.1f}".replace("-", "−")
+    """A shift with its sign and one decimal; beyond ``FAR`` only that it lies there."""
+    if value is None:
+        return "–"
+    return f"{value:+.1f}".replace("-", "−") if abs(value) <= FAR else f"< −{FAR:g}" if value < 0 else f"> {FAR:g}"
 
 
 def answer_words(saved: Diagnosed) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 import warnings
 from contextlib import contextmanager
@@ -118,6 +119,21 @@ def display_unit(unit: str) -> tuple[float, str]:
     return DISPLAY_UNITS.get(unit, (1.0, unit))
 
 
+def shown_unit(unit: str, values) -> tuple[float, str]:
+    """Factor and name of the unit in which values saved in ``unit`` are shown; mN·m for small torques."""
+    if unit == "N·m" and max((abs(v) for v in values), default=1.0) < 0.1:
+        return 1e3, "mN·m"
+    return display_unit(unit)
+
+
+def parts(items: list, at_most: int) -> list[list]:
+    """Items in as few parts of at most so many as there can be, the parts alike in size."""
+    if not items:
+        return []
+    size = math.ceil(len(items) / math.ceil(len(items) / at_most))
+    return [items[i : i + size] for i in range(0, len(items), size)]
+
+
 INDICATOR_WORDS = {
     "lost_motion_rad": "lost motion δ",
     "zero_torque_width_rad": "width at zero torque w(0)",
@@ -141,6 +157,21 @@ INDICATOR_WORDS = {
 def indicator_words(name: str) -> str:
     """An indicator's name in words, with its symbol."""
     return INDICATOR_WORDS.get(name, words(name))
+
+
+def drawn_words(name: str) -> str:
+    """The same for a figure, whose letters cannot be set low."""
+    return indicator_words(name).replace("of W_abs", "of absorbed energy").replace(" W_abs", "")
+
+
+_SAVED_NAMES = re.compile(rf"(?<![\w.'\"])({'|'.join(INDICATOR_WORDS)})(?![\w'\"])")
+
+
+def in_words(text: str) -> str:
+    """A sentence of a result file with indicators, T_r and shares in words and with spaces, as everywhere else."""
+    text = _SAVED_NAMES.sub(lambda m: indicator_words(m[1]), text)
+    text = re.sub(r"(?<=\d) ?T_r\b", " of the rated torque", text)
+    return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![\w·])T_r\b", "the rated torque", text))
 
 
 def words(name: str) -> str:

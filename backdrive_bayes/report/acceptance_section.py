@@ -8,7 +8,8 @@ from backdrive_bayes.figures.catalogue import caption, verdict_figures
 from backdrive_bayes.figures.style import display_unit, indicator_words, words
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.numbers import interval_text, level_text, like_interval, probability_text, significant
-from backdrive_bayes.report.text import free
+from backdrive_bayes.report.sentences import sentence
+from backdrive_bayes.report.text import free, short_digest
 from backdrive_bayes.results import VERDICT, read_result
 
 ON_SUMMARY = 6
@@ -52,9 +53,9 @@ def chapter(folder: Path) -> Chapter:
 
 def _banner(verdict):
     reason = verdict["reason"][:1].upper() + verdict["reason"][1:].rstrip(".")
-    text = f"{free(reason)}."
+    text = f"{sentence(reason, 400)}."
     if verdict["next"]:
-        text += f" Next: {free(verdict['next']['do'])}"
+        text += f" Next: {sentence(verdict['next']['do'], 500)}"
     return Banner(_TONES[verdict["verdict"]], verdict["verdict"].upper(), text)
 
 
@@ -68,7 +69,7 @@ def _identity(verdict):
         ("All limits kept", f"with probability {probability_text(verdict['conformance_probability'])}"),
         ("Limiting", _limiting(verdict)),
     ]
-    return Facts([*rows, *([("Data, SHA-256", fit["data_sha256"])] if fit.get("data_sha256") else [])])
+    return Facts([*rows, *([("Data, SHA-256", short_digest(fit["data_sha256"]))] if fit.get("data_sha256") else [])])
 
 
 def _limiting(verdict):
@@ -160,7 +161,7 @@ def _global(verdict):
     rows = [r for r in verdict["limits"] if r["global"]]
     if not rows:
         return []
-    shares = "Accepted / rejected / inconclusive"
+    shares = "Accepted / rejected / inconclusive [%]"
     columns = ["Indicator", "Process (mean ± sd)", "Out of limits", "Consumer's", "Producer's", shares]
     return [
         Heading("Global risks of the process"),
@@ -174,13 +175,19 @@ def _global_cells(row):
     found = row["global"]
     process = found["process"]
     origin = f"{found['batch_units']} other units" if found["batch_units"] else f"stated, {process['shape']}"
-    shares = " / ".join(f"{100 * found[k]:.3g} %" for k in ("accepted", "rejected", "inconclusive"))
+    shares = " / ".join(f"{100 * found[k]:.3g}" for k in ("accepted", "rejected", "inconclusive"))
     return [
         [indicator_words(row["indicator"]), _at(row)],
-        [f"{significant(process['mean'], 4, factor)} ± {significant(process['sd'], 2, factor)} {unit}", origin],
+        [f"{_process(process, factor)} {unit}", origin],
         *(probability_text(found[k]) for k in ("nonconforming", "consumer", "producer")),
         shares,
     ]
+
+
+def _process(process, factor):
+    """Mean ± standard deviation with the same decimals."""
+    spread = {"median": process["mean"], "lo": process["mean"] - process["sd"], "hi": process["mean"] + process["sd"]}
+    return f"{like_interval(process['mean'], spread, factor)} ± {like_interval(process['sd'], spread, factor)}"
 
 
 def _structure(verdict):
@@ -211,5 +218,8 @@ def _model(model):
 
 
 def _reproduction(fit):
-    rows = [(name, str(fit[key])) for name, key in (("Seed", "seed"), ("Software", "versions")) if key in fit]
-    return [Facts(rows)] if rows else []
+    rows = [(name, str(fit[key])) for name, key in _REPRODUCTION if fit.get(key) is not None]
+    return [Heading("Reproduction"), Facts(rows)] if rows else []
+
+
+_REPRODUCTION = (("Seed", "seed"), ("Software", "versions"), ("Data, SHA-256", "data_sha256"))

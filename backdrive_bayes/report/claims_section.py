@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from backdrive_bayes.figures.style import display_unit
+from backdrive_bayes.figures.style import shown_unit
 from backdrive_bayes.report.blocks import Heading, Note, Paragraph, Table
 from backdrive_bayes.report.numbers import interval_text, probability_text, significant
+from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import free
 
 MOST_NUMBERS = 3
@@ -31,38 +32,49 @@ def claims(result) -> list:
 
 
 _COLUMNS = ["No.", "Claim and predicate", "Numbers behind it", "Probability", "Verdict"]
-_WIDTHS = [0, 2.6, 1.6, 0.75, 0.8]
+_WIDTHS = [0, 2.5, 1.9, 0.7, 0.8]
+NOTHING = 1e-6
+"""Beside the largest of a series, values below this share of it are nothing."""
 
 
 def _count(found):
     verdicts = [c["verdict"] for c in found["claims"]]
-    words = ("holds", "does not hold", "open", "inconclusive", "not answered")
-    counted = [(w, verdicts.count(w)) for w in words if w in verdicts]
-    return "Of " + str(len(verdicts)) + " claims: " + ", ".join(f"{n} {w}" for w, n in counted) + "."
+    counts = [(verdicts.count(verdict), said) for verdict, said in _SAID.items()]
+    told = [f"{n} {one if n == 1 else more}" for n, (one, more) in counts if n]
+    return f"Of {len(verdicts)} {'claims' if len(verdicts) != 1 else 'claim'}, {', '.join(told)}."
+
+
+_SAID = {
+    "holds": ("holds", "hold"),
+    "does not hold": ("does not hold", "do not hold"),
+    "open": ("is open", "are open"),
+    "inconclusive": ("is inconclusive", "are inconclusive"),
+    "not answered": ("was not answered", "were not answered"),
+}
+"""Verdict → how it is said of one claim and of several."""
 
 
 def _row(claim):
-    verdict = [claim["verdict"], free(claim["reason"])] if claim["reason"] else claim["verdict"]
     probability = "–" if claim["probability"] is None else probability_text(claim["probability"])
     note = f" ({free(claim['note'])})" if claim["note"] else ""
-    asked = [free(claim["claim"]), free(claim["asked"] + note, 420)]
-    return [free(claim["id"], 8), asked, _numbers(claim), probability, verdict]
+    asked = [sentence(claim["claim"]), sentence(claim["asked"] + note, 900)]
+    return [free(claim["id"], 8), asked, _numbers(claim), probability, claim["verdict"]]
 
 
 def _numbers(claim):
-    shown = claim["numbers"]
-    if not shown:
-        return "–"
-    shown = [n for n in shown if n["at"] == shown[0]["at"]][:MOST_NUMBERS]
-    return "; ".join(_number(n) for n in shown)
+    found = claim["numbers"]
+    shown = [n for n in found if n["at"] == found[0]["at"]][:MOST_NUMBERS]
+    texts = "; ".join(_number(n) for n in shown) or "–"
+    return [texts, sentence(claim["reason"])] if claim["reason"] else texts
 
 
 def _number(number):
-    factor, unit = display_unit(number["unit"])
-    if isinstance(number["median"], list):
-        first, *_, last = number["median"]
+    median = number["median"]
+    factor, unit = shown_unit(number["unit"], median if isinstance(median, list) else [median])
+    if isinstance(median, list):
+        top = max(median, key=abs)
+        first, *_, last = (v if abs(v) > NOTHING * abs(top) else 0.0 for v in median)
         ends = f"{significant(first, 3, factor)} to {significant(last, 3, factor)}"
-        top = max(number["median"])
         over = f", at most {significant(top, 3, factor)}" if top > 1.05 * max(first, last) else ""
         return f"{ends}{over} {unit}".rstrip()
     return f"{interval_text(number, factor)} {unit}".rstrip()

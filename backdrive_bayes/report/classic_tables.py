@@ -16,7 +16,7 @@ def least_squares(saved) -> list:
         if classic.get("indicators"):
             blocks.append(_classic_table(label, record, classic["indicators"], saved.indicators["level"]))
         if classic.get("branches"):
-            blocks.append(Note("; ".join(_branch(n, b) for n, b in classic["branches"].items()) + "."))
+            blocks.append(Note(f"{label}: " + "; ".join(_branch(n, b) for n, b in classic["branches"].items()) + "."))
     if not blocks:
         return []
     text = (

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, comparison_figures
-from backdrive_bayes.figures.style import display_unit, indicator_words
+from backdrive_bayes.figures.style import indicator_words, shown_unit
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.claims_section import claims
 from backdrive_bayes.report.numbers import interval_text, level_text, probability_text
-from backdrive_bayes.report.text import free
+from backdrive_bayes.report.sentences import sentence
+from backdrive_bayes.report.text import Free, free, short_digest
 from backdrive_bayes.results import COMPARISON, read_result
 
 KEY = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
@@ -21,9 +22,10 @@ def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``compare`` and lay out its pages."""
     result = read_result(Path(folder) / "comparison.json", COMPARISON)
     figures = comparison_figures(result)
+    level = result["level"]
     title = free("Comparison: " + ", ".join(result["names"]), 110)
     on_summary = [n for n in ("comparison-loops",) if n in figures]
-    rest = [Picture(n, caption(n)) for n in figures if n not in on_summary and n != "comparison-mechanism"]
+    rest = [Picture(n, caption(n, level), floats=True) for n in figures if n not in on_summary and n != "comparison-mechanism"]
     return Chapter(
         title,
         [
@@ -31,13 +33,13 @@ def chapter(folder: Path) -> Chapter:
             _banner(result),
             _identity(result),
             *_key_tables(result),
-            *(Picture(n, caption(n)) for n in on_summary),
+            *(Picture(n, caption(n, level)) for n in on_summary),
             Signature(["Reviewed by", "Date", "Signature"]),
         ],
         [
-            *(Picture(n, caption(n), spilt=True) for n in on_summary),
+            *(Picture(n, caption(n, level), spilt=True) for n in on_summary),
             Heading("How each unit releases energy"),
-            Picture("comparison-mechanism", caption("comparison-mechanism")),
+            Picture("comparison-mechanism", caption("comparison-mechanism", level)),
             *_mechanism(result),
             *rest,
             *_all_tables(result),
@@ -66,9 +68,9 @@ def _banner(result):
 def _identity(result):
     rows = []
     for name, unit, fit in zip(result["names"], result["units"], result["reproduction"], strict=True):
-        about = (unit.get("identity") or {}).get("description") or ""
-        digest = fit.get("data_sha256", "")
-        rows.append((free(name, 24), free(f"{about}{'; ' if about else ''}data SHA-256 {digest[:12]}…" if digest else about)))
+        about = free((unit.get("identity") or {}).get("description") or "", 80)
+        digest = fit.get("data_sha256")
+        rows.append((free(name, 24), Free("; ".join(filter(None, [about, digest and f"data SHA-256 {short_digest(digest)}"])))))
     return Facts(rows)
 
 
@@ -90,7 +92,7 @@ def _legend(result):
     return (
         f"Median [{level_text(result['level'])} interval]. Ratio: first over second. “Greater” and “less” are said of the first, "
         f"where it differs by more than {100 * result['rope']:.3g} % with a probability of {100 * result['clear']:.3g} %. "
-        "P(first larger): the probability that the first is larger at all."
+        "P: the probability that the first is larger at all."
     )
 
 
@@ -102,7 +104,7 @@ def _table(pair, condition, names):
     rows = []
     for name in (n for n in names if n in condition["indicators"]):
         row = condition["indicators"][name]
-        factor, unit = _shown_unit(row)
+        factor, unit = shown_unit(row["unit"], [row[k]["median"] for k in ("first", "second")])
         rows.append(
             [
                 f"{indicator_words(name)} [{unit or '–'}]",
@@ -113,15 +115,8 @@ def _table(pair, condition, names):
                 row["verdict"],
             ]
         )
-    columns = ["Indicator", free(pair["first"], 24), free(pair["second"], 24), "Ratio", "P(first larger)", "Verdict"]
-    return Table(columns, rows, [1.6, 1.4, 1.4, 1.4, 0.6, 0.8])
-
-
-def _shown_unit(row):
-    """Display unit of a row; small torques in mN·m."""
-    factor, unit = display_unit(row["unit"])
-    small = unit == "N·m" and max(row["first"]["median"], row["second"]["median"]) < 0.1
-    return (1e3, "mN·m") if small else (factor, unit)
+    columns = ["Indicator", free(pair["first"], 24), free(pair["second"], 24), "Ratio", "P", "Verdict"]
+    return Table(columns, rows, [4.0, 3.16, 3.16, 3.62, 1.3, 1.76])
 
 
 def _all_tables(result):
@@ -132,7 +127,7 @@ def _all_tables(result):
             title = f"{free(pair['first'], 40)} and {free(pair['second'], 40)} at {_at(condition)}{predicted}"
             blocks += [Heading(title), _table(pair, condition, list(condition["indicators"]))]
             if condition["not_compared"]:
-                why = "; ".join(f"{indicator_words(n)}: {free(t)}" for n, t in condition["not_compared"].items())
+                why = "; ".join(f"{indicator_words(n)}: {sentence(t)}" for n, t in condition["not_compared"].items())
                 blocks.append(Note(f"Not compared: {why}."))
     return [*blocks, Note(_legend(result))] if blocks else []
 
@@ -155,7 +150,7 @@ def _mechanism(result):
 
 def _refused(result):
     rows = [
-        [free(r["unit"], 40), free(r["record"], 60), free(r["against"], 40), free(r["reason"])]
+        [free(r["unit"], 40), free(r["record"], 60), free(r["against"], 40), sentence(r["reason"])]
         for p in result["pairs"]
         for r in p["refused"]
     ]

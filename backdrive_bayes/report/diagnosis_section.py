@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.figures import diagnosis
+from backdrive_bayes.figures.catalogue import caption
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import label_words
 from backdrive_bayes.figures.style import words
@@ -23,7 +24,7 @@ def chapter(folder: Path) -> Chapter:
     saved = Diagnosed.read(folder)
     figures = diagnosis.figures_of(saved)
     title = Free(free(saved.result["unit"], 66) + ": diagnosis")
-    overview = [("diagnosis", diagnosis.CAPTIONS["diagnosis"])] if "diagnosis" in figures else []
+    overview = [("diagnosis", caption("diagnosis"))] if "diagnosis" in figures else []
     return Chapter(
         title,
         [
@@ -60,14 +61,14 @@ def _record_list(saved):
 
 
 def _details(saved, figures) -> list[Block]:
-    def pictures(kind):
-        return [Picture(n, diagnosis.CAPTIONS[kind]) for n in figures if n == kind or n.startswith(f"{kind}-")]
+    def pictures(kind, floats=True):
+        return [Picture(n, caption(n, saved.level), floats) for n in figures if n == kind or n.startswith(f"{kind}-")]
 
+    told = bool(saved.summary)
     parts = (
         ("Which effect", [*tables.probabilities(saved), *tables.effect_parameters(saved)]),
-        ("Where the gap lies", [*_summary(saved), *pictures("gap-map")]),
+        ("Where the gap lies", [*_summary(saved), *(p for k in ("gap-map", "gap-residual") for p in pictures(k, told))]),
         ("How far it shrinks", [*tables.shrink(saved), *pictures("closed-fraction")]),
-        ("Residual along the loop", pictures("gap-residual")),
         ("What it changes", [*tables.indicators(saved), *pictures("parameter-shift"), *tables.parameter_shift(saved)]),
         ("Next test", next_test(saved)),
         ("Convergence", tables.convergence(saved)),
@@ -77,5 +78,4 @@ def _details(saved, figures) -> list[Block]:
 
 
 def _summary(saved):
-    summary = saved.where.get("summary")
-    return [Paragraph(free(summary, 600))] if summary else []
+    return [Paragraph(free(saved.summary, 600))] if saved.summary else []

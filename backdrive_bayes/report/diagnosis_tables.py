@@ -10,13 +10,12 @@ from backdrive_bayes.figures.diagnosis_words import (
     own_of_a_record,
     parameter_words,
     share_text,
-    shown_unit,
     signed,
 )
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD
+from backdrive_bayes.figures.style import ARCMIN_PER_RAD, shown_unit
 from backdrive_bayes.report.blocks import Note, Table
 from backdrive_bayes.report.fit_tables import INDICATORS
-from backdrive_bayes.report.numbers import decimals, fixed, interval_text, significant
+from backdrive_bayes.report.numbers import decimals, fixed, interval_text, level_text, significant
 from backdrive_bayes.report.text import free
 
 TOP = 6
@@ -61,7 +60,7 @@ def effect_parameters(saved: Diagnosed) -> list:
         found = entry.get("parameters") or {}
         lines = [_parameter(saved, n, about) for n, about in found.items() if not own_of_a_record(n)]
         title = free(f"Parameters of {effect_words(entry['effect'])}", 120)
-        blocks += [Table([title, "Median [interval]", "Unit"], lines, [2, 1.4, 0.8])] if lines else []
+        blocks += [Table([title, f"Median [{level_text(saved.level)} interval]", "Unit"], lines, [2, 1.4, 0.8])] if lines else []
         own = sum(map(own_of_a_record, found))
         blocks += [Note(f"Left out: {own} of single records, such as phases and initial positions.")] if own else []
     return blocks
@@ -89,7 +88,10 @@ def shrink(saved: Diagnosed) -> list:
     if control:
         lines.append(["Gaussian process (control)", "–", "–", "–", share_text(control)])
     columns = ["Held out", "before [arcmin]", "after [arcmin]", "noise floor [arcmin]", "closed fraction"]
-    note = Note("Root mean square of measured minus modelled angle, before and after the effect is added to the model.")
+    note = Note(
+        "Root mean square of measured minus modelled angle, before and after the effect is added to the model. Closed "
+        f"fraction: median [{level_text(saved.level)} interval]."
+    )
     return [Table(columns, lines, [1.5, 1, 1, 1.2, 1.3]), note]
 
 
@@ -104,7 +106,10 @@ def indicators(saved: Diagnosed) -> list:
             lines.append([name, unit, *texts, _change(before, after, factor)])
     if not lines:
         return []
-    note = Note("Indicators of the reducer without and with the effect in the model; the change is that of the median.")
+    note = Note(
+        f"Median [{level_text(saved.level)} interval] of the reducer without and with the effect in the model; the change is "
+        "that of the median."
+    )
     return [Table(["Indicator", "Unit", "Before", "After", "Change"], lines, [1.6, 0.6, 1.3, 1.3, 0.7]), note]
 
 
@@ -125,7 +130,8 @@ def parameter_shift(saved: Diagnosed) -> list:
             [free(parameter_words(saved, shift["parameter"]), 60), free(unit or "–", 20), *intervals, signed(shift["shift_sd"])]
         )
     columns = ["Parameter", "Unit", "Before", "After", "Shift [own sd]"]
-    return [Table(columns, lines, [1.5, 0.8, 1.2, 1.2, 0.95])] if lines else []
+    note = Note(f"Median [{level_text(saved.level)} interval] without and with the effect in the model; sd: standard deviations.")
+    return [Table(columns, lines, [1.5, 0.8, 1.2, 1.2, 0.95]), note] if lines else []
 
 
 def convergence(saved: Diagnosed) -> list:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, share_text
+from backdrive_bayes.figures.style import in_words
 from backdrive_bayes.report.blocks import Facts, Paragraph
 from backdrive_bayes.report.numbers import significant
 from backdrive_bayes.report.text import Free, free
@@ -28,7 +29,7 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
         reason = free(saved.inconclusive, 400).rstrip(".")
         text = Free(f"Reason: {reason}. Do not name a cause from this result.")
         return "bad", "INCONCLUSIVE: no effect is named", text
-    where = free(saved.where.get("summary") or "", 400)
+    where = free(saved.summary, 400)
     if not saved.effects:
         return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))
     rivals = _rivals(saved)
@@ -63,5 +64,5 @@ def next_test(saved: Diagnosed) -> list:
     if test.get("expected_entropy_drop_bits") is not None:
         drop = significant(test["expected_entropy_drop_bits"], 2)
         rows.append(("Expected gain", f"{drop} bit less uncertainty about the cause"))
-    todo = str(test.get("do") or "").strip()
+    todo = in_words(str(test.get("do") or "").strip())
     return [Paragraph(free(todo[:1].upper() + todo[1:], 600)), Facts(rows)]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, figures_of
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import PER_FIGURE, display_unit, record_labels, words
+from backdrive_bayes.figures.style import PER_FIGURE, record_labels, words
 from backdrive_bayes.report import fit_tables as tables
 from backdrive_bayes.report.blocks import (
     Banner,
@@ -19,17 +19,21 @@ from backdrive_bayes.report.blocks import (
     Signature,
 )
 from backdrive_bayes.report.classic_tables import least_squares
-from backdrive_bayes.report.numbers import fixed, interval_text, level_text, prior_text
-from backdrive_bayes.report.text import free
+from backdrive_bayes.report.numbers import fixed, level_text
+from backdrive_bayes.report.parameter_tables import parameters
+from backdrive_bayes.report.text import free, short_digest
 
 ON_SUMMARY = 2 * PER_FIGURE
 """Records whose indicators fit on the summary page."""
+IN_PLACE = ("loop", "modules", "torque-energy")
+"""Figures that stand where they are called for; those behind them let text go first and so keep their order."""
 
 
 def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``fit`` and lay out its pages."""
     saved = Saved.read(folder)
     figures = figures_of(saved)
+    level = saved.indicators["level"]
     shown = ["loop"] if len(saved.records) <= PER_FIGURE else []
     rest = [name for name in figures if name not in shown]
     return Chapter(
@@ -40,10 +44,10 @@ def chapter(folder: Path) -> Chapter:
             _identity(saved),
             Heading("Key indicators"),
             *tables.indicators(saved, ON_SUMMARY),
-            *[Picture(name, caption(name)) for name in shown],
+            *[Picture(name, caption(name, level)) for name in shown],
             Signature(["Reviewed by", "Date", "Signature"]),
         ],
-        [*(Picture(name, caption(name), spilt=True) for name in shown), *_details(saved, rest)],
+        [*(Picture(name, caption(name, level), spilt=True) for name in shown), *_details(saved, rest)],
         figures,
     )
 
@@ -77,7 +81,7 @@ def _identity(saved):
         ("Intervals", f"central {level_text(about['level'])} credible intervals, written median [low, high]"),
     ]
     if attributes.get("data_sha256"):
-        rows.append(("Data, SHA-256", attributes["data_sha256"]))
+        rows.append(("Data, SHA-256", short_digest(attributes["data_sha256"])))
     return Facts(rows + credit)
 
 
@@ -88,8 +92,11 @@ def _record_list(records):
 
 
 def _details(saved, figures) -> list[Block]:
+    level = saved.indicators["level"]
+
     def pictures(kind):
-        return [Picture(n, caption(n)) for n in figures if n == kind or n.startswith(f"{kind}-")]
+        names = [n for n in figures if n == kind or n.startswith(f"{kind}-")]
+        return [Picture(n, caption(n, level), floats=kind not in IN_PLACE) for n in names]
 
     loops = pictures("loop")
     more = tables.indicators(saved) if len(saved.records) > ON_SUMMARY else []
@@ -110,29 +117,12 @@ def _details(saved, figures) -> list[Block]:
         *tables.convergence(saved),
         *pictures("trace"),
         *pictures("predictive"),
-        *(Picture(p.name, p.caption, floats=True) for p in pictures("corner")),
-        *_parameters(saved),
+        *pictures("corner"),
+        Heading("Parameters and priors"),
+        *parameters(saved),
         *tables.noise(saved),
         *least_squares(saved),
         *_reproduction(saved),
-    ]
-
-
-def _parameters(saved):
-    rows = []
-    for name, about in saved.indicators["parameters"].items():
-        factor, unit = display_unit(about["unit"])
-        rows.append(
-            [
-                tables.quantity_name(saved, name),
-                interval_text(about, factor),
-                unit or "–",
-                prior_text(about["prior"], factor),
-            ]
-        )
-    return [
-        Heading("Parameters and priors"),
-        tables.parameter_table(rows, saved.indicators["level"]),
     ]
 
 

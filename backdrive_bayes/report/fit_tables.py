@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, record_labels, words
+from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, parts, record_labels, shown_unit, words
 from backdrive_bayes.report.blocks import Heading, Note, Table
 from backdrive_bayes.report.numbers import fixed, interval_text, level_text, percent, significant
 from backdrive_bayes.report.text import free
@@ -25,15 +25,13 @@ def indicators(saved, at_most: int | None = None) -> list:
     records, labels = saved.records[:at_most], record_labels(saved.records)
     level, k = level_text(saved.indicators["level"]), saved.indicators["k"]
     blocks = []
-    for i in range(0, len(records), PER_FIGURE):
-        part = records[i : i + PER_FIGURE]
+    for part in parts(list(zip(labels, records, strict=False)), PER_FIGURE):
         rows = [
-            [name, unit, *(_with_share(r["indicators"].get(key), factor) for r in part)]
+            [name, unit, *(_with_share(r["indicators"].get(key), factor) for _, r in part)]
             for key, name, unit, factor in INDICATORS
         ]
-        blocks.append(
-            Table(["Indicator", "Unit", *labels[i : i + PER_FIGURE]], rows, [1.6, 0, *[1.4] * len(part)])
-        )
+        columns = ["Indicator", "Unit", *(label for label, _ in part)]
+        blocks.append(Table(columns, rows, [1.6, 0, *[1.4] * len(part)]))
     left = len(saved.records) - len(records)
     more = f" {left} further records follow on the next pages." if left > 0 else ""
     blocks.append(
@@ -71,7 +69,7 @@ def mechanism(saved) -> list:
     return [
         _by_record(saved, ["S_g [mJ]", "S_f [mJ]", "S_g/S [–]", "S_f/S [–]"], split),
         Note(
-            "S_g and S_f: energy that the geometric error and friction dissipate in a cycle; what is left "
+            f"{_interval(saved)} S_g and S_f: energy that the geometric error and friction dissipate in a cycle; what is left "
             "of S is model error."
         ),
     ]
@@ -87,57 +85,91 @@ def back_drive(saved) -> list:
 
     return [
         Heading("Back-drive"),
-        _by_record(saved, ["load τ_L [N·m]", "angle turned θ_L [arcmin]", "energy absorbed W_L [mJ]"], cells),
+        _by_record(saved, ["load τ_L [N·m]", "angle θ_L [arcmin]", "energy W_L [mJ]"], cells),
         Note(
-            "Angle turned and energy absorbed when the load arrives at zero torque on the rising branch of "
+            f"{_interval(saved)} Angle turned and energy absorbed when the load arrives at zero torque on the rising branch of "
             "the settled loop."
         ),
+        *_loads(saved),
     ]
+
+
+def _loads(saved) -> list:
+    """What the loads turn and store that were asked for; nothing where none were."""
+    rows = [
+        [
+            significant(row["load_Nm"]),
+            significant(row["loading_rate_Nm_per_s"]),
+            interval_text(row["theta_L_rad"], ARCMIN_PER_RAD),
+            interval_text(row["W_L_J"], MJ_PER_J),
+            " and ".join(_PREDICTED.get(p, free(p, 20)) for p in row["predicted"]) or "no",
+        ]
+        for row in saved.indicators.get("loads") or []
+    ]
+    if not rows:
+        return []
+    columns = ["load τ_L [N·m]", "rate [N·m/s]", "angle θ_L [arcmin]", "energy W_L [mJ]", "predicted"]
+    return [
+        Table(columns, rows, [0.8, 0.7, 1.2, 1.2, 0.9]),
+        Note(
+            f"{_interval(saved)} Loads that were asked for. Predicted: the load lies beyond the largest measured amplitude, or "
+            "the rate was not measured; the intervals are widened for it."
+        ),
+    ]
+
+
+_PREDICTED = {"load": "load", "loading_rate": "rate"}
+
+
+def _interval(saved):
+    return f"Median [{level_text(saved.indicators['level'])} interval]."
 
 
 def humps(saved) -> list:
     """Bounds of the ranges W1, W2 and W3."""
 
+    found = [r["torque_energy"].get(key) for r in saved.records for key in _HUMP]
+    factor, unit = shown_unit("N·m", [f["median"] for f in found if f])
+
     def cells(r):
-        return [interval_text(r["torque_energy"][key]) for key in ("tau1_Nm", "tau2_Nm")] + [
-            significant(r["amplitude_Nm"])
-        ]
+        ranges = [interval_text(r["torque_energy"][key], factor) for key in _HUMP]
+        return [*ranges, significant(r["amplitude_Nm"], factor=factor)]
 
     return [
-        _by_record(saved, ["τ₁ [N·m]", "τ₂ [N·m]", "amplitude T [N·m]"], cells),
+        _by_record(saved, [f"τ₁ [{unit}]", f"τ₂ [{unit}]", f"amplitude T [{unit}]"], cells),
         Note(
-            "τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's "
+            f"{_interval(saved)} τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's "
             "convention)."
         ),
     ]
 
 
 def by_amplitude(saved) -> list:
-    """Extremes and means of S(t) and u(t)."""
-    keys = [(q, f) for q in ("S", "u") for f in ("max", "min", "mean")]
+    """Extremes and means of S and u: of the loops of amplitude t, and of windows cut out of the measured loop."""
+    loops = _over_positions(saved, "by_amplitude", "Loops of amplitude t", _EXTREMES)
+    windows = _over_positions(saved, "windowed", "Windows |τ| ≤ t", _EXTREMES[2:])
+    about = " Windows are cut out of the measured loop; their u may exceed 1, for they are no closed loops." if windows else ""
+    return [*loops, *windows, Note(f"{_interval(saved)} Over all t up to the amplitude.{about}")]
 
-    def cells(r):
-        own, factor = r["by_amplitude"], {"S": MJ_PER_J, "u": 1.0}
-        return [interval_text(own.get(f"{f}_{q}_J" if q == "S" else f"{f}_{q}"), factor[q]) for q, f in keys]
 
-    labels = record_labels(saved.records)
-    names = [f"S {f} [mJ]" if q == "S" else f"u {f} [–]" for q, f in keys]
-    values = [cells(r) for r in saved.records]
+def _over_positions(saved, key, title, quantities):
+    records = [(label, r[key]) for label, r in zip(record_labels(saved.records), saved.records, strict=True) if r.get(key)]
     blocks = []
-    for i in range(0, len(labels), PER_FIGURE):
-        part = slice(i, i + PER_FIGURE)
-        rows = [[name, *(v[j] for v in values[part])] for j, name in enumerate(names)]
-        blocks.append(Table(["Over all t", *labels[part]], rows, [1.0, *[1.3] * len(labels[part])]))
+    for part in parts(records, PER_FIGURE):
+        rows = [[name, *(interval_text(own.get(q), factor) for _, own in part)] for q, name, factor in quantities]
+        blocks.append(Table([title, *(label for label, _ in part)], rows, [1.0, *[1.1] * len(part)]))
     return blocks
 
 
-def parameter_table(rows, level: float) -> Table:
-    """Parameters with posterior and prior."""
-    return Table(
-        ["Parameter", f"Posterior, {level_text(level)}", "Unit", "Prior (same unit)"],
-        rows,
-        [1.5, 1.35, 0, 1.6],
-    )
+_HUMP = ("tau1_Nm", "tau2_Nm")
+_EXTREMES = (
+    ("max_S_J", "S max [mJ]", MJ_PER_J),
+    ("min_S_J", "S min [mJ]", MJ_PER_J),
+    ("mean_S_J", "S mean [mJ]", MJ_PER_J),
+    ("max_u", "u max [–]", 1.0),
+    ("min_u", "u min [–]", 1.0),
+    ("mean_u", "u mean [–]", 1.0),
+)
 
 
 def noise(saved) -> list:
@@ -152,7 +184,7 @@ def noise(saved) -> list:
     return [
         Heading("Noise and model error"),
         _by_record(
-            saved, ["white [arcmin]", "correlated [arcmin]", "correlation time [ms]", "torque [mN·m]"], cells
+            saved, ["white [arcmin]", "correlated [arcmin]", "corr. time [ms]", "torque [mN·m]"], cells
         ),
         Note(
             f"Standard deviations. The smooth model error has a prior standard deviation of {error} arcmin."

@@ -7,8 +7,9 @@ import re
 
 MOST_DECIMALS = 8
 UNDEFINED = "not defined"
-_LOG_NORMAL = re.compile(r"log-normal, median (\S+), log-sd (\S+)")
-_UNIFORM = re.compile(r"uniform on \[(\S+), (\S+)\]")
+_LOG_NORMAL = re.compile(r"log-normal, median (\S+), log-sd ([^\s,]+)(?:, below (\S+))?")
+_UNIFORM = re.compile(r"((?:log-)?uniform) on \[(\S+), (\S+)\]")
+_NORMAL = re.compile(r"normal, mean 0, sd (\S+)")
 
 
 def decimals(spread: float, value: float) -> int:
@@ -28,6 +29,8 @@ def interval_text(interval: dict | None, factor: float = 1.0) -> str:
     if interval is None:
         return UNDEFINED
     median, lo, hi = (factor * interval[k] for k in ("median", "lo", "hi"))
+    if max(abs(lo), abs(median), abs(hi)) < 0.5 * 10**-MOST_DECIMALS:
+        lo = median = hi = 0.0
     n = decimals(0.5 * (hi - lo), median)
     return f"{_fixed(median, n)} [{_fixed(lo, n)}, {_fixed(hi, n)}]"
 
@@ -82,10 +85,13 @@ def prior_text(prior: str, factor: float) -> str:
     here.
     """
     if found := _LOG_NORMAL.fullmatch(prior):
-        return f"log-normal, median {factor * float(found[1]):.4g}, log-sd {found[2]}"
+        below = f", below {factor * float(found[3]):.4g}" if found[3] else ""
+        return f"log-normal, median {factor * float(found[1]):.4g}, log-sd {found[2]}{below}"
     if found := _UNIFORM.fullmatch(prior):
-        lo, hi = (factor * float(v) for v in found.groups())
-        return f"uniform on [{lo:.4g}, {hi:.4g}]".replace("-", "−")
+        lo, hi = (f"{factor * float(v):.4g}".replace("-", "−") for v in found.groups()[1:])
+        return f"{found[1]} on [{lo}, {hi}]"
+    if found := _NORMAL.fullmatch(prior):
+        return f"normal, mean 0, sd {factor * float(found[1]):.4g}"
     return prior if factor == 1.0 else f"{prior} (SI units)"
 
 

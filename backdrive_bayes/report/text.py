@@ -6,11 +6,12 @@ import re
 import unicodedata
 
 LONGEST = 240
+DIGITS = 12
 UNBREAKABLE = 36
 BREAK = "\u200b"
 LOW, END = "\ue000", "\ue001"
 """Marks around an index; free text cannot hold them, because :func:`printable` spells them out."""
-_SYMBOLS = re.compile(r"(?<![A-Za-z])(k?[WSTθτ]|p)_(abs|g|f|r|L|c)(?![A-Za-z])")
+_SYMBOLS = re.compile(r"(?<![A-Za-z_'\"])(k?[WSTθτ]|p)_(abs|g|f|r|L|c)(?![A-Za-z_])")
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
 
@@ -28,8 +29,21 @@ class Free(str):
 
 def free(text, longest: int = LONGEST) -> Free:
     """``text`` marked as free text and cut to at most ``longest`` characters."""
+    return Free(cut(text, longest))
+
+
+def cut(text, longest: int) -> str:
+    """``text`` in one line of at most ``longest`` characters, ended after a whole word where one ends in its later half."""
     text = " ".join(str(text).split())
-    return Free(text if len(text) <= longest else text[: longest - 1] + "…")
+    if len(text) <= longest:
+        return text
+    head, space, _ = text[:longest].rpartition(" ")
+    return (head.rstrip(" ,;:–-") if space and len(head) > longest // 2 else text[: longest - 1]) + "…"
+
+
+def short_digest(digest: str) -> str:
+    """The first digits of a digest, enough to recognise it; the whole stands under "Reproduction"."""
+    return digest if len(digest) <= DIGITS else digest[:DIGITS] + "…"
 
 
 def typeset(text: str) -> str:
@@ -44,9 +58,10 @@ def _spelt(character):
 def _breakable(found):
     word, step = found[0], UNBREAKABLE // 2
     # A digest fits its line, and a break inside it would be copied along with it.
-    return (
-        word if _DIGEST.fullmatch(word) else BREAK.join(word[i : i + step] for i in range(0, len(word), step))
-    )
+    if _DIGEST.fullmatch(word):
+        return word
+    pieces = re.split(r"(?<=[(),;=/])|(?<=\.)(?=\D)", word)
+    return BREAK.join(p[i : i + step] for p in pieces for i in range(0, len(p), step))
 
 
 def every_string(data) -> list[str]:

@@ -141,6 +141,15 @@ def test_shifts_of_hundreds_of_deviations_stay_legible():
     assert "logarithmic" in words_of(figures_of(Diagnosed(result))["parameter-shift"])
 
 
+def test_a_parameter_that_was_as_good_as_fixed_leaves_the_ticks_apart():
+    result = diagnosis()
+    result["parameter_shift"][0]["shift_sd"] = -4829870312410.8
+    figure = figures_of(Diagnosed(result))["parameter-shift"]
+    axes = figure.axes[0]
+    assert [t.get_text() for t in axes.get_xticklabels()] == ["−1000", "−100", "−10", "0", "10", "100", "1000"]
+    assert "< −1000" in words_of(figure) and min(min(line.get_xdata()) for line in axes.lines) >= -1000
+
+
 def test_no_gap_draws_what_there_is():
     made = figures_of(saved(**NO_GAP))
     assert list(made) == ["diagnosis", "gap-map", "gap-residual"]

@@ -15,7 +15,7 @@ from support_results import write_result
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.figures import catalogue, loop
 from backdrive_bayes.figures.saved import Saved, record_blocks
-from backdrive_bayes.figures.style import numbers, record_labels, styled, words
+from backdrive_bayes.figures.style import drawn_words, in_words, numbers, parts, record_labels, styled, words
 from backdrive_bayes.model.registry import BASELINE, candidates_beside, members_named
 
 NAMES = ["loop", "modules", "torque-energy", "amplitude", "corner", "trace", "predictive"]
@@ -162,6 +162,18 @@ def test_the_residual_is_free_of_the_offset(folder):
     blocks = record_blocks(Saved.read(folder), 1)
     assert np.abs(blocks.residual_rad).max() < 2e-3
     assert blocks.first.sum() == 30 and set(blocks.direction) == {-1.0, 1.0}
+
+
+def test_records_are_spread_evenly_over_figures_and_captions_are_told_once():
+    assert parts([1, 2, 3, 4], 3) == [[1, 2], [3, 4]] and parts([1, 2, 3], 3) == [[1, 2, 3]] and parts([], 3) == []
+    assert catalogue.caption("predictive-2") == "Posterior predictive check, continued."
+    assert "median and 80 % interval" in catalogue.caption("amplitude", 0.8)
+
+
+def test_a_figure_spells_out_what_it_cannot_set_low():
+    assert [drawn_words(n) for n in ("absorbed_J", "elastic_share")] == ["absorbed energy", "elastic share of absorbed energy"]
+    assert in_words("0.5 T_r, loop_area_J 7%") == "0.5 of the rated torque, dissipated energy S 7 %"
+    assert in_words("sensitivity('W_L_J') of k·T_r") == "sensitivity('W_L_J') of k·T_r"
 
 
 def test_many_records_make_several_figures_with_distinct_labels(tmp_path):

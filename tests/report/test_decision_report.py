@@ -15,7 +15,9 @@ from backdrive_bayes.decisions.comparison import compare
 from backdrive_bayes.decisions.global_risk import Process
 from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.report import report
+from backdrive_bayes.report import report, sections
+from backdrive_bayes.report.blocks import Chapter, Heading, Paragraph
+from backdrive_bayes.report.claims_section import _count, _number
 from backdrive_bayes.report.numbers import interval_text, probability_text
 
 ARCMIN = 10800 / 3.141592653589793
@@ -43,9 +45,18 @@ def test_the_first_page_can_be_signed(verdict):
     result, text, _ = verdict
     first = text[0]
     assert "INCONCLUSIVE" in first and "Signature" in first and "Next:" in first
-    assert HOSTILE in first and result["reproduction"]["data_sha256"] in first
+    digest = result["reproduction"]["data_sha256"]
+    assert HOSTILE in first and f"{digest[:12]}…" in first and digest not in first
+    assert digest in " ".join(text[1:])
     assert "k = 0.03" in first and "90 %" in first and "consumer's 5 %, producer's 10 %" in first
     assert "predicted" in first
+
+
+def test_the_banner_says_indicators_in_words(verdict):
+    result, text, _ = verdict
+    assert "absorbed_J" in result["next"]["do"]
+    assert "the verdict on absorbed energy Wabs rests on a prediction" in text[0].replace("W abs", "Wabs")
+    assert "absorbed_J" not in " ".join(text)
 
 
 def test_every_limit_stands_with_its_numbers(verdict):
@@ -95,6 +106,48 @@ def test_claims_stand_with_probability_and_verdict(comparison):
         start = re.escape(claim["claim"][:24])
         assert re.search(start, whole), claim["claim"]
     assert "does not hold" in whole and "not answered" in whole and "unit U was not given" in whole
+
+
+def test_claims_are_counted_in_a_sentence():
+    verdicts = ["holds", "open", "open", "does not hold", "not answered"]
+    found = {"claims": [{"verdict": v} for v in verdicts]}
+    assert _count(found) == "Of 5 claims, 1 holds, 1 does not hold, 2 are open, 1 was not answered."
+    assert _count({"claims": found["claims"][1:3]}) == "Of 2 claims, 2 are open."
+
+
+def test_a_value_stays_on_one_line_with_its_interval(comparison):
+    lines = [line for page in comparison[2].pages for line in page.extract_text().splitlines()]
+    broken = [line for line in lines if re.search(r"\[[−\d.]*,?( [−\d.]+)?$|^[−\d., ]*\]", line.strip())]
+    assert sum("]" in line for line in lines) > 40 and not broken
+
+
+def test_a_series_that_is_nothing_at_its_ends_is_not_a_wall_of_digits():
+    curve = {"unit": "rad", "median": [1e-249, 0.03, 1e-200], "at": ""}
+    assert _number(curve) == "0 to 0, at most 103 arcmin"
+    assert _number({"unit": "N·m", "median": 0.0957757, "lo": 0.09577, "hi": 0.095783}) == "95.776 [95.770, 95.783] mN·m"
+
+
+def test_a_chapter_does_not_begin_at_the_foot_of_a_page(monkeypatch, tmp_path):
+    made = [Chapter(f"c{i}", [Heading(f"c{i}", 1)], [Paragraph("text")] * (3 + i), {}) for i in range(20)]
+    monkeypatch.setattr(sections, "chapters", lambda folder: made)
+    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path])))
+    heights = chapter_heights(reader)
+    assert len(heights) == 2 * len(made) + 1
+    assert min(heights) > (20 + 60) / 25.4 * 72
+    assert len(reader.pages) < 2 * len(made)
+
+
+def chapter_heights(reader):
+    """Height above the paper's edge [pt] of every heading of a chapter."""
+    found = []
+
+    def see(text, cm, tm, font, size):
+        if text.strip() and round(abs(size * tm[3] * cm[3])) == 17:
+            found.append((page.page_number, round(tm[5] * cm[3] + cm[5])))
+
+    for page in reader.pages:
+        page.extract_text(visitor_text=see)
+    return [height for _, height in dict.fromkeys(found)]
 
 
 def test_tags_and_outline(comparison, verdict):

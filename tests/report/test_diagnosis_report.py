@@ -67,6 +67,29 @@ def test_tables_hold_the_numbers_of_the_json(made):
     assert "slip vanishes there" in text and "0.34 bit" in text and "1.0060" in text
 
 
+def test_saved_sentences_are_said_in_words(tmp_path):
+    summary = "78% lies above 0.75 T_r on the loop_area_J branch."
+    write_diagnosis(tmp_path, 1, where={"summary": summary, "map": []})
+    pages, _ = pages_of(tmp_path)
+    assert "78 % lies above 0.75 of the rated torque on the dissipated energy S branch." in pages[0]
+    assert "T_r" not in " ".join(pages) and "loop_area_J" not in " ".join(pages)
+
+
+def test_tables_name_the_level_of_their_intervals(made):
+    text = " ".join(made[1])
+    for words in ("Median [90 % interval] Unit", "Closed fraction: median [90 % interval]", "[90 % interval] without and with"):
+        assert words in text
+    assert "median and 90 % interval of each record" in text
+
+
+def test_a_parameter_that_was_as_good_as_fixed_gives_no_wall_of_digits(tmp_path):
+    shifts = write_diagnosis(tmp_path, 1)["parameter_shift"]
+    shifts[0]["shift_sd"] = -4829870312410.8
+    write_diagnosis(tmp_path, 1, parameter_shift=shifts)
+    pages, _ = pages_of(tmp_path)
+    assert "< −1000" in " ".join(pages) and "48298703" not in " ".join(pages)
+
+
 def test_the_same_result_gives_the_same_bytes(tmp_path):
     write_diagnosis(tmp_path, 1)
     assert report.report_bytes([tmp_path]) == report.report_bytes([tmp_path])

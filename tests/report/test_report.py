@@ -11,7 +11,7 @@ from support_results import GROUP_ATTRIBUTES, indicators, write_result
 from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.report import report
 from backdrive_bayes.report.numbers import interval_text, percent, prior_text, significant
-from backdrive_bayes.report.text import printable
+from backdrive_bayes.report.text import cut, free, printable, typeset
 
 HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref //"
 ARCMIN = 10800 / 3.141592653589793
@@ -46,7 +46,9 @@ def test_the_first_page_has_the_indicators_of_the_json(made):
             assert interval_text(entry, factor) in page
             assert lo <= median <= hi
     assert "91 % from model error" in page and "k = 0.03" in page and "90 %" in page
-    assert GROUP_ATTRIBUTES["data_sha256"] in page and "CONVERGED" in page and "INCONCLUSIVE" not in page
+    digest = GROUP_ATTRIBUTES["data_sha256"]
+    assert f"{digest[:12]}…" in page and digest not in page and digest in text_of(reader)
+    assert "CONVERGED" in page and "INCONCLUSIVE" not in page
     assert "A. Author 2024" in page and "CC BY 4.0" in page
 
 
@@ -89,6 +91,39 @@ def test_details_name_seed_versions_priors_and_reconstructed_equations(made):
         "10.1177/00202940261442382",
     ):
         assert needed in text
+
+
+def test_intervals_come_with_their_level(made):
+    text = text_of(made[2])
+    assert "median and 90 % interval" in text and "median and interval" not in text
+    for beneath in ("S", "τ₁: half the rise", "Angle turned and energy absorbed", "Over all t"):
+        assert f"Median [90 % interval]. {beneath}" in text
+
+
+def test_parameters_of_single_records_stand_side_by_side(made):
+    own = interval_text(made[0]["parameters"]["initial_gap_position[0]"])
+    text = text_of(made[2])
+    assert "Of single records, 90 % 0.01 N·m/s 0.05 N·m/s" in text and f"{own} {own}" in text
+    assert "drag torque 4.00 [3.96, 4.04] mN·m log-normal, median 10, log-sd 1" in text
+
+
+def test_loads_and_windows_are_shown_where_they_are_saved(tmp_path):
+    result = write_result(tmp_path, records=1)
+    (tmp_path / "posterior.nc").unlink()
+    assert not re.search("Windows|Loads that were asked for", folder_text(tmp_path))
+    angle, energy = ({"median": m, "lo": 0.9 * m, "hi": 1.1 * m} for m in (0.0728, 1.562e-3))
+    load = {"load_Nm": 0.05, "loading_rate_Nm_per_s": 0.02, "theta_L_rad": angle, "W_L_J": energy, "predicted": []}
+    result["loads"] = [load, load | {"load_Nm": 0.2, "predicted": ["load", "loading_rate"]}]
+    result["records"][0]["windowed"] = result["records"][0]["by_amplitude"] | {"max_u": {"median": 2.5, "lo": 2.4, "hi": 2.6}}
+    (tmp_path / "indicators.json").write_text(json.dumps(result))
+    text = folder_text(tmp_path)
+    shown = f"{interval_text(angle, ARCMIN)} {interval_text(energy, 1e3)}"
+    assert f"0.0500 0.0200 {shown} no" in text and f"0.200 0.0200 {shown} load and rate" in text
+    assert "Windows |τ| ≤ t" in text and "u max [–] 2.50 [2.40, 2.60]" in text and "may exceed 1" in text
+
+
+def folder_text(folder):
+    return text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([folder]))))
 
 
 def test_figures_stay_text_and_vector(made):
@@ -142,6 +177,18 @@ def test_several_folders_make_one_report_with_a_summary_each(tmp_path):
     assert reader.metadata.title == "Backdrivability report: unit a, unit b"
 
 
+def test_a_long_title_ends_with_a_whole_word(tmp_path):
+    names = [f"gearbox {greek} northern" for greek in ("alpha", "beta", "gamma")]
+    for name in names:
+        write_result(tmp_path / name, records=1, unit=name)
+        (tmp_path / name / "posterior.nc").unlink()
+    footer = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path / n for n in names]))), 0)
+    whole = f"Backdrivability report: {', '.join(names)}"
+    assert f"{whole[:88].rsplit(' ', 1)[0]}… page 1 of" in footer
+    assert cut("one two three", 9) == "one two…" and cut("one two, three", 9) == "one two…" and cut("x" * 20, 9) == "x" * 8 + "…"
+    assert cut("one two", 7) == "one two" and free("a" * 5 + " " + "b" * 30, 20) == "aaaaa " + "b" * 13 + "…"
+
+
 def test_folders_without_results_and_broken_results_are_one_clear_line(tmp_path):
     with pytest.raises(BadInput, match="none of them"):
         report.report_bytes([tmp_path])
@@ -184,6 +231,7 @@ def test_the_verb_writes_into_the_first_folder_or_into_out(tmp_path, capsys):
         (1234.5, 1200.0, 1270.0, "1234 [1200, 1270]"),
         (0.0015, 0.0015, 0.0015, "0.00150 [0.00150, 0.00150]"),
         (0.0, 0.0, 0.0, "0.000 [0.000, 0.000]"),
+        (1e-20, 1e-21, 3e-20, "0.000 [0.000, 0.000]"),
     ],
 )
 def test_value_and_interval_share_sensible_decimals(median, lo, hi, shown):
@@ -195,5 +243,13 @@ def test_numbers_in_words():
     assert significant(0.0999977) == "0.100" and significant(1.2e-9, 2) == "1.2e−09"
     assert percent(0.913) == "91 %" and percent(None) == "–"
     assert prior_text("log-normal, median 0.01, log-sd 1.5", ARCMIN) == "log-normal, median 34.38, log-sd 1.5"
+    below = "log-normal, median 0.003, log-sd 1, below 0.06"
+    assert prior_text(below, 1e3) == "log-normal, median 3, log-sd 1, below 60"
+    assert prior_text("log-uniform on [0.01, 0.3]", 1e3) == "log-uniform on [10, 300]"
+    assert prior_text("normal, mean 0, sd 0.12", 10) == "normal, mean 0, sd 1.2"
     assert prior_text("half-Cauchy 3", 2.0) == "half-Cauchy 3 (SI units)"
+    assert typeset("W_abs of S_g") == "W\ue000abs\ue001 of S\ue000g\ue001"
+    assert typeset("R1.S_g_over_S; sensitivity('W_L_J')") == "R1.S_g_over_S; sensitivity('W_L_J')"
+    assert printable("largest(R2.loop_area_J(amplitude=0.04))").split("\u200b")[:3] == ["largest(", "R2.", "loop_area_J("]
+    assert "0.04" in printable("largest(R2.loop_area_J(amplitude=0.04))")
     assert printable("f" * 64) == "f" * 64 and "\u200b" in printable("x" * 64)
