@@ -81,8 +81,8 @@ def curvature_bias(blocks_per_segment, corrected=True):
 
 def test_reduced_posterior_agrees_with_the_exact_one(exact):
     shift, spread = disagreement(exact, problem_of(exact[0], NOISE))
-    # Blocks lose some of the information, most of it (a twentieth of the sd) along the shape of the step, which moves the mean by the
-    # square root of that at most.
+    # Blocks lose some of the information, most of it (a twentieth of the sd) along the shape of the step, which moves the mean by
+    # the square root of that at most.
     assert spread < 0.08
     assert shift < 0.45
 
