@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import signal
 import sys
 from pathlib import Path
 
@@ -41,6 +43,8 @@ def main(argv: list[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else list(argv)
     try:
         args = _parser(argv).parse_args(argv)
+        with contextlib.suppress(ValueError):  # signals are for the main thread
+            signal.signal(signal.SIGTERM, _stop)
         return args.run(args)
     except SystemExit as done:  # --help and --version
         return done.code if isinstance(done.code, int) else 0
@@ -73,6 +77,11 @@ def _parser(argv: list[str]) -> argparse.ArgumentParser:
     return parser
 
 
+def _stop(number, frame):
+    # Leaves by way of everything that cleans up behind itself.
+    raise SystemExit(128 + number)
+
+
 class _Version(argparse.Action):
     def __call__(self, parser, namespace, values, option_string=None):
         from importlib.metadata import PackageNotFoundError, version
@@ -88,5 +97,5 @@ class _Version(argparse.Action):
 
 def _seed(text: str) -> int:
     if not text.isdecimal() or len(text) > 18:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 0, found '{text}'")
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0 of at most 18 digits, found '{text}'")
     return int(text)

@@ -25,7 +25,7 @@ UNKNOWN_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
 PAIRS_FITTED = 4
 POLISHED = 3
 SEARCHES = 3
-SETTLED = 7.5
+SETTLED = 6.0
 """Log posterior by which a fresh search may find a better mode before another is due: what shifts log odds by about one."""
 WORTHWHILE = 4.0
 """Log-likelihood by which a pair must beat its better half in the linear search to be fitted."""

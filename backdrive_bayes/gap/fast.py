@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.special import ive
+from scipy.special import ive, logsumexp
 
 from backdrive_bayes.gap.fine import FineLeg, fine_legs
 from backdrive_bayes.gap.hypotheses import Fitted
@@ -52,7 +52,8 @@ def _angle_periods(legs):
     # Where the reading stands still between its quanta the median step may be zero.
     step = np.median([np.mean(np.abs(np.diff(leg.angle_rad))) for leg in legs])
     span = max(np.ptp(leg.angle_rad) for leg in legs)
-    return np.geomspace(min(5 * step, 0.05 * span), 0.1 * span, PERIODS)
+    # Evenly in the number of periods within the range, so near that a sine between two of them stays in phase.
+    return span / np.arange(10.0, max(span / (5 * step), 20.0), 0.5)
 
 
 def _torque_periods(setting):
@@ -78,7 +79,11 @@ def _sine_of_angle(setting, legs, periods):
             energy, load = energy + own_energy, load + own_load
         shared += _any_phase(amplitude, load, energy)
     best = periods[int(np.argmax(shared.max(axis=0)))]
-    together, alone = _averaged(shared), _averaged(apart)
+    # Beforehand no octave of periods is likelier than another.
+    weight = periods / periods.sum()
+    together, alone = _averaged(shared, weight), _averaged(apart, weight)
+    if len(legs) == len({leg.record for leg in legs}):
+        return together, float(best)
     return min(together, COHERENCE * (together - alone)), float(best)
 
 
@@ -88,9 +93,9 @@ def _any_phase(amplitude, load, energy):
     return np.log(ive(0, pull)) + pull - 0.5 * amplitude**2 * energy
 
 
-def _averaged(values) -> float:
-    top = values.max()
-    return float(top + np.log(np.mean(np.exp(values - top))))
+def _averaged(values, weight) -> float:
+    """Log of the mean of exp(values) (amplitudes, periods) under the prior weight of the periods."""
+    return float(logsumexp(values, b=weight) - np.log(len(values)))
 
 
 def _saw_columns(leg: FineLeg, period):
@@ -169,4 +174,4 @@ def _saw_of_torque(setting, legs, periods):
             gain = np.einsum("pi,pi->p", load, np.linalg.solve(inner, load[..., None])[..., 0])
             spread = np.linalg.slogdet(inner)[1] + 2 * gram.shape[-1] * np.log(amplitude * setting.noise_rad)
             total[a] += 0.5 * (gain - spread)
-    return _averaged(total), float(periods[int(np.argmax(total.max(axis=0)))])
+    return _averaged(total, np.full(periods.size, 1 / periods.size)), float(periods[int(np.argmax(total.max(axis=0)))])

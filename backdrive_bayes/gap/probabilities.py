@@ -27,7 +27,7 @@ class Calibration:
     slow model explains; ``triple`` is the share left to three effects at once, or to fast
     structure with something unknown beside it. ``module`` is how much likelier than an effect a module is that every reducer has
     and the baseline was asked to do without. ``slack`` is the share of what effects explain that counts as their formulas' error
-    where something unknown explains more.
+    and is taken off the evidence of anything unknown.
     """
 
     temperature: float = 6.0

@@ -20,6 +20,7 @@ class Outcome(enum.Enum):
         "not converged within the budget: go on with more time (--resume --budget SECONDS), or leave out the member whose "
         "parameter mixes worst (--baseline)"
     )
+    NOT_BURNT_IN = "not converged: the budget ended before the burn-in did: go on with more time (--resume --budget SECONDS)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,9 @@ class Convergence:
         fine = np.isnan(self.rhat) | (
             (self.rhat < MAX_RHAT) & (self.bulk_ess >= MIN_ESS) & (self.tail_ess >= MIN_ESS)
         )
-        return Outcome.CONVERGED if fine.all() and self.burnt_in else Outcome.NOT_CONVERGED
+        if not self.burnt_in:
+            return Outcome.NOT_BURNT_IN
+        return Outcome.CONVERGED if fine.all() else Outcome.NOT_CONVERGED
 
     def joined(self, other: Convergence) -> Convergence:
         """Both sets of quantities as one."""
@@ -62,6 +65,7 @@ class Convergence:
         """The contract's ``convergence`` object."""
         return {
             "converged": self.outcome is Outcome.CONVERGED,
+            "burnt_in": self.burnt_in,
             "max_rhat": float(np.nanmax(self.rhat)),
             "min_bulk_ess": float(np.nanmin(self.bulk_ess)),
             "min_tail_ess": float(np.nanmin(self.tail_ess)),

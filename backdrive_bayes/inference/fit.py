@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.inference.chain_file import Unfinished
 from backdrive_bayes.inference.diagnostics import Convergence, Outcome, diagnose_draws
 from backdrive_bayes.inference.discrepancy import Discrepancy, learn_discrepancy
@@ -17,6 +18,7 @@ from backdrive_bayes.inference.optimum import Optimum, find_optimum
 from backdrive_bayes.inference.problem import Problem, RecordData
 from backdrive_bayes.inference.sampling import Ensembles, Settings, begin_ensembles, run_ensembles, warm_up
 from backdrive_bayes.inference.starts import along_ridges, feature_starts, scattered, screened_starts, with_other_pasts
+from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import Scale
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
@@ -89,7 +91,7 @@ def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, bloc
     """Reduce the records, find the mode and learn noise and discrepancy; ``scale`` overrides the priors' scale."""
     unit = without_wild(unit)
     scale = scale or Scale(unit.rated_torque_nm, angle_scale_rad(unit))
-    model = ReducerModel(members_named(baseline), scale)
+    model = ReducerModel(_baseline_members(baseline), scale)
     # A loop from rest has two and a half legs.
     blocks_per_segment = blocks_per_segment or int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 60, 120))
     segments = [find_segments(r.time_s, r.torque_nm) for r in unit.records]
@@ -102,6 +104,13 @@ def prepare(unit: Unit, rng, baseline=BASELINE, scale: Scale | None = None, bloc
     starts = np.concatenate([[with_other_pasts(problem, optimum.z, rng)], scattered(optimum.z, rng)])
     optimum = find_optimum(problem, starts)
     return _refine(problem, optimum)
+
+
+def _baseline_members(baseline):
+    members = members_named(baseline)
+    if not any(member.stage is Stage.COMPLIANCE for member in members):
+        raise BadInput("--baseline", "a module that turns under torque among them, such as elastic", ",".join(baseline))
+    return members
 
 
 def _refine(problem, optimum) -> Prepared:
@@ -225,7 +234,7 @@ def _begun(prepared, rng, settings, seconds_left):
     restarts = []
     for _ in range(3):
         problem, optimum = prepared.problem, prepared.optimum
-        starts = along_ridges(problem, optimum.z, rng)
+        starts = along_ridges(problem, optimum.z, rng) if seconds_left() > 0 else optimum.z[None]
         proposal, best = warm_up(problem.log_posterior, optimum.z, optimum.covariance, starts, rng, settings, seconds_left)
         if problem.log_posterior(best)[0] < optimum.log_posterior + BETTER_MODE:
             break

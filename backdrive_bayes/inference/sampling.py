@@ -100,14 +100,16 @@ def warm_up(log_posterior, mode, covariance, starts, rng, settings: Settings, se
     """A proposal fitted to the posterior by importance sampling and differential evolution.
 
     ``starts`` (points, dimension) lie spread over the posterior's ridges, which the Gaussian at ``mode`` may not reach: half of
-    the walkers set out from them. Returns the proposal and the best point seen.
+    the walkers set out from them. Returns the proposal and the best point of where the walkers are at the end.
     """
     proposal, share = polish(log_posterior, StudentMixture.single(mode, covariance), rng)
     walkers = _walkers(settings, mode.size)
     state, best = _starts(log_posterior, proposal, rng, walkers)
     if len(starts):
-        state[::2] = starts[rng.integers(len(starts), size=len(state[::2]))]
-        state[::2] += JITTER * rng.standard_normal(state[::2].shape) * np.sqrt(np.diag(covariance))
+        # The first half, so that even and odd walkers, which a mixture is fitted to and judged by, are of both kinds.
+        half = walkers // 2
+        apart = JITTER * np.sqrt(np.diag(covariance)) * rng.standard_normal((half, mode.size))
+        state[:half] = starts[rng.integers(len(starts), size=half)] + apart
     sampler = _sampler(walkers, mode.size, log_posterior, [(DEMove(), 0.9), (DEMove(gamma0=1.0), 0.1)], rng)
     history = []
     for block in range(settings.warm_up_blocks):
@@ -154,9 +156,9 @@ def run_ensembles(log_posterior, chains: Chains, rng, settings: Settings, enough
             return drawn
         if seconds_left() <= 0:
             return replace(drawn, chains=chains)
-        affordable = int(seconds_left() * steps / (time.perf_counter() - began))
-        steps = max(10, min(max(steps, drawn.steps // 2), affordable))
+        step_s = (time.perf_counter() - began) / steps
         chains = _refitted(log_posterior, chains, rng, settings, seconds_left)
+        steps = max(10, min(max(steps, drawn.steps // 2), int(seconds_left() / step_s)))
 
 
 def _refitted(log_posterior, chains, rng, settings, seconds_left):

@@ -72,8 +72,8 @@ def _number(number):
     median = number["median"]
     factor, unit = shown_unit(number["unit"], median if isinstance(median, list) else [median])
     if isinstance(median, list):
-        top = max(median, key=abs)
-        first, *_, last = (v if abs(v) > NOTHING * abs(top) else 0.0 for v in median)
+        top, size = max(median), max(abs(v) for v in median)
+        first, *_, last = (v if abs(v) > NOTHING * size else 0.0 for v in median)
         ends = f"{significant(first, 3, factor)} to {significant(last, 3, factor)}"
         over = f", at most {significant(top, 3, factor)}" if top > 1.05 * max(first, last) else ""
         return f"{ends}{over} {unit}".rstrip()

@@ -23,7 +23,8 @@ def test_draws_without_their_burn_in_have_not_converged():
     passed = diagnose_draws(["a", "b", "c"], independent(), STEP, 1.0)
     assert passed.outcome is Outcome.CONVERGED
     cut = replace(passed, burnt_in=False)
-    assert cut.outcome is Outcome.NOT_CONVERGED and cut.joined(passed).outcome is Outcome.NOT_CONVERGED
+    assert cut.outcome is Outcome.NOT_BURNT_IN and cut.joined(passed).outcome is Outcome.NOT_BURNT_IN
+    assert not cut.to_json()["converged"] and "--budget" in cut.to_json()["advice"]
 
 
 def shifted_ensemble(draws):

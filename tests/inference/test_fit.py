@@ -5,6 +5,7 @@ import pytest
 from support.bench import KNOWN_NOISE, unit_of
 from support.known import RATED, SCALE, as_arrays, reducer, settled_loops, typical_values
 
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.indicators import loop_area_j
 from backdrive_bayes.indicators.loop import torque_grid
 from backdrive_bayes.indicators.summary import core_indicators, monitored, reducer_loops
@@ -49,11 +50,16 @@ def test_another_seed_is_another_posterior(unit, hurried):
     assert (np.abs(other.z.mean(axis=0) - hurried.z.mean(axis=0)) < 0.5 * hurried.z.std(axis=0) + 0.1).all()
 
 
+def test_a_baseline_that_does_not_turn_is_refused(unit):
+    with pytest.raises(BadInput, match="--baseline"):
+        fit(unit, baseline=("friction",), settings=BRIEF, scale=SCALE)
+
+
 def test_no_time_is_not_converged_with_advice(hurried):
     assert not hurried.converged
     said = hurried.convergence.to_json()
     assert not said["converged"] and "--budget" in said["advice"] and said["worst"] in hurried.problem.labels
-    assert hurried.convergence.outcome is Outcome.NOT_CONVERGED
+    assert hurried.convergence.outcome is Outcome.NOT_BURNT_IN
 
 
 def test_enough_time_converges_in_every_parameter_and_indicator(patient):
