@@ -128,7 +128,7 @@ def per_walker_python(problem, record, optimum, evaluations_per_ess):
             "note": "default move: measured time of one evaluation times the default move's evaluations per effective draw"}
 
 
-def numpyro_nuts(problem, optimum, warm=500, draws=1000):
+def numpyro_nuts(problem, optimum, warm=200, draws=300):
     """NUTS on the same reduced posterior, compilation in and out."""
     try:
         import jax
@@ -138,7 +138,7 @@ def numpyro_nuts(problem, optimum, warm=500, draws=1000):
     jax.config.update("jax_enable_x64", True)
     potential = _jax_potential(problem)
     began = time.perf_counter()
-    kernel = numpyro.infer.NUTS(potential_fn=potential, dense_mass=True)
+    kernel = numpyro.infer.NUTS(potential_fn=potential, dense_mass=True, max_tree_depth=7)
     options = {"num_chains": 2, "chain_method": "sequential", "progress_bar": False}
     mcmc = numpyro.infer.MCMC(kernel, num_warmup=warm, num_samples=draws, **options)
     start = np.stack([optimum.z, optimum.z + 0.1 * np.sqrt(np.diag(optimum.covariance))])
