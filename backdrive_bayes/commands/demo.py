@@ -5,12 +5,12 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from backdrive_bayes.commands import accept, check, compare, fit, report
+from backdrive_bayes.commands import accept, check, compare, diagnose, fit, report
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.results import BASELINE
 from backdrive_bayes.errors import BadInput
 
-HELP = "check, fit, judge and compare the packaged twins and write one PDF"
+HELP = "check, fit, judge, compare and diagnose the packaged twins and write one PDF"
 UNITS = ("reducer-1", "reducer-2")
 
 
@@ -20,7 +20,7 @@ def add_arguments(parser) -> None:
 
 
 def run(args) -> int:
-    """Run check, fit and accept on every packaged unit, compare them, then the report; the worst exit code of the fits."""
+    """Check, fit and judge every packaged unit, compare them, diagnose the last, then the report; the worst code of the fits."""
     out = args.out or Path("reports/demo")
     if not (args.data / UNITS[0]).is_dir():
         raise BadInput(args.data, "the folder of packaged units (run from the project's folder or give --data)", "none")
@@ -37,6 +37,8 @@ def run(args) -> int:
         results.append(folder)
     both = out / "comparison"
     compare.run(Namespace(units=list(results), out=both, claims="paper", rope=0.05, **defaults))
-    results.append(both)
+    gap = out / f"{UNITS[-1]}-gap"
+    diagnose.run(Namespace(unit=args.data / UNITS[-1], out=gap, no_posterior=True, **defaults))
+    results += [both, gap]
     report.run(Namespace(results=results, out=out, seed=args.seed))
     return max(codes)

@@ -62,7 +62,7 @@ class Settings:
     refits: int = 2
     kept_per_ensemble: int = 1500
     burn_in_moves: float = 12.0
-    longest_burn_in: int = 200
+    longest_burn_in: int = 120
     max_seconds: float = 120.0
     good_share: float = 0.15
 
