@@ -170,7 +170,7 @@ _SAVED_NAMES = re.compile(rf"(?<![\w.'\"])({'|'.join(INDICATOR_WORDS)})(?![\w'\"
 def in_words(text: str) -> str:
     """A sentence of a result file with indicators, T_r and shares in words and with spaces, as everywhere else."""
     text = _SAVED_NAMES.sub(lambda m: indicator_words(m[1]), text)
-    text = re.sub(r"(?<=\d) ?T_r\b", " of the rated torque", text)
+    text = re.sub(r"(\d+(?:\.\d+)?) ?T_r\b", lambda m: f"{m[1]} {'of' if float(m[1]) < 1 else 'times'} the rated torque", text)
     return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![\w·])T_r\b", "the rated torque", text))
 
 
