@@ -60,7 +60,7 @@ def write_folder(out: Path | str) -> Iterator[Path]:
         temporary.mkdir()
         yield temporary
         _move(temporary, out)
-    except BaseException:
+    except BaseException:  # an interrupt too must leave nothing behind; it is raised again
         shutil.rmtree(temporary, ignore_errors=True)
         for folder in made:
             with contextlib.suppress(OSError):

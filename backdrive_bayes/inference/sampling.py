@@ -163,20 +163,16 @@ def run_ensembles(log_posterior, chains: Chains, rng, settings: Settings, enough
 
 def _refitted(log_posterior, chains, rng, settings, seconds_left):
     """The same chains, or new ones from where they stand: with a proposal that is clearly better, or for want of burn-in."""
-    if not chains.burnt_in:
-        return _begin_again(log_posterior, chains, chains.proposal, chains.refits_left, rng, settings, seconds_left)
-    flat = [s.get_chain(flat=True) for s in chains.samplers]
-    held_out = np.concatenate(flat[1::2] or flat)
-    held_out = held_out[:: max(1, held_out.shape[0] // 3000)]
-    better, score = best_mixture(np.concatenate(flat[::2]), held_out, rng)
-    # How likely the proposal finds the chain's own draws tells of regions that it misses; importance weights cannot.
-    if not chains.refits_left or score <= float(np.mean(chains.proposal.log_density(held_out))) + WORTHWHILE:
-        return chains
-    return _begin_again(log_posterior, chains, better, chains.refits_left - 1, rng, settings, seconds_left)
-
-
-def _begin_again(log_posterior, chains, proposal, refits_left, rng, settings, seconds_left):
-    """New chains from where the old ones stand."""
+    proposal, refits_left = chains.proposal, chains.refits_left
+    if chains.burnt_in:
+        flat = [s.get_chain(flat=True) for s in chains.samplers]
+        held_out = np.concatenate(flat[1::2] or flat)
+        held_out = held_out[:: max(1, held_out.shape[0] // 3000)]
+        better, score = best_mixture(np.concatenate(flat[::2]), held_out, rng)
+        # How likely the proposal finds the chain's own draws tells of regions that it misses; importance weights cannot.
+        if not refits_left or score <= float(np.mean(proposal.log_density(held_out))) + WORTHWHILE:
+            return chains
+        proposal, refits_left = better, refits_left - 1
     states = [s.get_last_sample() for s in chains.samplers]
     return _begin(log_posterior, proposal, states, refits_left, rng, settings, seconds_left)
 

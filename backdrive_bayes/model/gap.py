@@ -27,6 +27,7 @@ def positions_in_gap(drive, steps: Steps, place, spread=0.0) -> np.ndarray:
     ``place`` from 0 to 1 (…, 1) is where the path begins between the boundaries; teeth that share the gap may have been left at
     different places: the share ``spread`` (…, 1) of them lies at the one flank or the other so as to give the same mean position.
     """
+    # The columns that gap_positions takes: three of each, the shift between; then place and spread.
     fine = [1 / width for width in steps.widths]
     columns = np.broadcast_arrays(*steps.shares, *steps.torques, drive.shift_nm, *fine, place, spread)
     shape, path = columns[0].shape[:-1], drive.path
