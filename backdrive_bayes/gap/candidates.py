@@ -21,7 +21,9 @@ REFERENCE = ("misfit", MISFIT_LENGTH, 0.5)
 MISFIT_LEVELS = (0.1, 0.3, 1.0, 3.0, 10.0)
 """Standard deviations of the misfit along the loop, in those of the noise, under which hypotheses are weighed."""
 UNKNOWN_KINDS = (("loop", 0.02), ("own_loop", 0.06), ("time_smooth", 0.1), ("time_rough", 0.05))
-UNKNOWN_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
+UNKNOWN_LEVELS = (1.0, 3.0, 10.0, 40.0)
+DOUBTED = 4
+"""Best hypotheses beside which unexplained structure is looked for, the baseline being one more."""
 PAIRS_FITTED = 4
 POLISHED = 3
 SEARCHES = 3
@@ -33,7 +35,7 @@ WORTHWHILE = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """A fitted hypothesis with its log evidence under each misfit level, shape (levels,)."""
+    """A fitted hypothesis with its log evidence under each misfit level and formula error, shape (levels, errors)."""
 
     fitted: Fitted
     log_evidence: np.ndarray
@@ -46,14 +48,14 @@ class Weighed:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Every hypothesis weighed, and the log evidence of unexplained structure, (2, kinds, levels).
+    """Every hypothesis weighed.
 
-    ``unexplained[0]`` is beside the baseline alone, ``unexplained[1]`` beside the best single effect. ``settled`` tells whether a
-    fresh search for the best hypothesis's mode came back to it.
+    ``unexplained`` holds the log evidences (kinds, levels, errors) of structure beside the baseline and the best hypotheses.
+    ``settled`` tells whether a fresh search for the best one's mode came back to it.
     """
 
     weighed: tuple[Weighed, ...]
-    unexplained: np.ndarray
+    unexplained: dict[tuple[str, ...], np.ndarray]
     settled: bool = True
 
     @property
@@ -78,15 +80,16 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
         screens[name] = screen(setting, none, name, reference, rng)
         singles[name] = fit_screened(screens[name], (name,), rng)
     weighed = [_weigh(setting, f) for f in (none, *singles.values())]
+    alone = {w.effects[0]: w.log_evidence.max() for w in weighed[1:]}
     for pair in _promising_pairs(none, singles, screens, reference):
         note(f"effects {' + '.join(pair)}")
-        known, other = sorted(pair, key=lambda n: -max(_weigh(setting, singles[n]).log_evidence))
+        known, other = sorted(pair, key=lambda n: -alone[n])
         found = screen(setting, singles[known], other, reference, rng, 128)
         weighed.append(_weigh(setting, fit_screened(found, pair, rng)))
     weighed, settled = _settle(setting, _polish_best(setting, weighed, rng), rng)
-    best = max(weighed[1 : len(names) + 1], key=lambda w: w.log_evidence.max(), default=weighed[0])
-    unexplained = np.array([_unexplained(setting, fitted) for fitted in (none, best.fitted)])
-    return Candidates(tuple(weighed), unexplained, settled)
+    note("what nothing explains")
+    doubted = [weighed[0], *sorted(weighed[1:], key=lambda w: -w.log_evidence.max())[:DOUBTED]]
+    return Candidates(tuple(weighed), {w.effects: _unexplained(setting, w.fitted) for w in doubted}, settled)
 
 
 def _polish_best(setting, weighed, rng):
@@ -134,10 +137,10 @@ def _weigh(setting, fitted):
 
 def _unexplained(setting, fitted):
     small = ("misfit", MISFIT_LENGTH, 0.3)
-    return [
+    return np.array([
         [log_evidence(setting, fitted, small, (kind, length, level)) for level in UNKNOWN_LEVELS]
         for kind, length in UNKNOWN_KINDS
-    ]
+    ])  # fmt: skip
 
 
 def _promising_pairs(none, singles, screens, whitening):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.gap import draws, next_test, where
 from backdrive_bayes.gap.candidates import REFERENCE, Candidates, Weighed, weigh_all
-from backdrive_bayes.gap.fast import VIBRATION, Fast, weigh_fast
+from backdrive_bayes.gap.fast import Fast, weigh_fast
 from backdrive_bayes.gap.probabilities import Evidences, credible_set, marginal, probabilities
 from backdrive_bayes.gap.setting import Setting
 from backdrive_bayes.gap.shrink import closed_fraction, shrink
@@ -58,7 +58,7 @@ def _diagnose(unit, baseline, seed, allowed, k, progress):
     setting = Setting.of(unit, rng, baseline)
     candidates = weigh_all(setting, rng, progress, allowed)
     progress("looking for jumps, vibration and encoder error")
-    fast = _allowed_fast(weigh_fast(setting, candidates.best.fitted), allowed)
+    fast = weigh_fast(setting, candidates.best.fitted).within(allowed)
     joint = probabilities(Evidences.of(candidates, fast))
     labels = marginal(joint)
     effects = max(joint, key=joint.get)
@@ -68,13 +68,6 @@ def _diagnose(unit, baseline, seed, allowed, k, progress):
     result["seconds"] = time.perf_counter() - began
     named = () if effects == ("unknown",) else effects
     return Diagnosis(result, named)
-
-
-def _allowed_fast(fast, allowed):
-    if allowed is None:
-        return fast
-    kept = {n: v for n, v in fast.log_evidence.items() if n in allowed or n == VIBRATION}
-    return replace(fast, log_evidence=kept)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,28 +8,26 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.special import logsumexp
 
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
 
-FORMULA_ERRORS = (0.03, 0.2, 0.6)
+FORMULA_ERRORS = (0.03, 0.15, 0.6)
 """Standard deviations by which an effect's contribution may differ from its formula, relative to the contribution."""
 FORMULA_LENGTH = 0.06
 
 
-def log_evidence(setting: Setting, fitted: Fitted, *terms) -> float:
+def log_evidence(setting: Setting, fitted: Fitted, *terms) -> np.ndarray:
     """Gaussian integral over the parameters of the model made linear at its mode, offsets under a flat prior.
 
-    ``terms`` are (kernel name, length, standard deviation in noise units) each, beside noise and formula error, of which all
-    levels count alike.
+    ``terms`` are (kernel name, length, standard deviation in noise units) each, beside noise and formula error. One value for
+    each of ``FORMULA_ERRORS``, all alike where there is no effect.
     """
     base = setting.covariance(*terms)
     if not fitted.contributions:
-        return _gaussian(setting, fitted, base)
+        return np.full(len(FORMULA_ERRORS), _gaussian(setting, fitted, base))
     shape = formula_error(setting, fitted)
-    values = [_gaussian(setting, fitted, base + level**2 * shape) for level in FORMULA_ERRORS]
-    return float(logsumexp(values, b=1 / len(values)))
+    return np.array([_gaussian(setting, fitted, base + level**2 * shape) for level in FORMULA_ERRORS])
 
 
 def _gaussian(setting, fitted, covariance):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -34,6 +34,12 @@ class Fast:
 
     log_evidence: dict[str, float]
     period: dict[str, float]
+
+    def within(self, allowed) -> Fast:
+        """What of it a library of the ``allowed`` effects knows (None: all), and vibration, which is of no library."""
+        if allowed is None:
+            return self
+        return replace(self, log_evidence={n: v for n, v in self.log_evidence.items() if n in allowed or n == VIBRATION})
 
 
 def weigh_fast(setting: Setting, fitted: Fitted) -> Fast:

@@ -20,30 +20,38 @@ from backdrive_bayes.model.registry import BASELINE
 
 @dataclass(frozen=True)
 class Calibration:
-    """Temperatures of slow and fast evidences, and prior weights; misfit weights follow ``MISFIT_LEVELS``.
+    """Temperatures of slow and fast evidences, and prior weights.
 
-    ``unknown`` is the weight of something else instead of any effect, ``remainder`` of something else beside the best one.
-    ``imprint`` multiplies the temperature of slow evidences beside stick-slip, whose jumps leave traces in wide blocks that no
-    slow model explains; ``triple`` is the share left to three effects at once, or to fast
-    structure with something unknown beside it. ``module`` is how much likelier than an effect a module is that every reducer has
-    and the baseline was asked to do without. ``slack`` is the share of what effects explain that counts as their formulas' error
-    and is taken off the evidence of anything unknown.
+    ``misfit`` follows ``MISFIT_LEVELS``, ``formula`` ``FORMULA_ERRORS``, ``unknown_level`` ``UNKNOWN_LEVELS``.
+
+    The temperature of slow evidences rises from ``cool``, where nothing but noise is weighed, towards ``warm``, where formulas
+    are approximate beyond the noise; it is halfway where the best hypothesis gains ``halfway`` on the baseline. Structure that
+    a hypothesis leaves unexplained is weighed at a temperature of its own, ``strange``, after ``slack`` is taken off, the share
+    of what effects explain that counts as their formulas' error. ``unknown`` is the weight of something else and no effect,
+    ``remainder`` of something else beside an effect, relative to that effect. ``imprint`` multiplies the temperature of slow
+    evidences beside stick-slip, whose jumps leave traces in wide blocks that no slow model explains; ``triple`` is the share
+    left to three effects at once, or to fast structure with something unknown beside it. ``module`` is how much likelier than an
+    effect a module is that every reducer has and the baseline was asked to do without.
     """
 
-    temperature: float = 6.0
+    cool: float = 2.0
+    warm: float = 6.0
+    halfway: float = 40.0
+    strange: float = 3.0
     fast_temperature: float = 8.0
     none: float = 0.4
     single: float = 0.445
     pair: float = 0.005
     unknown: float = 0.15
-    remainder: float = 0.003
+    remainder: float = 0.3
     fast: float = 0.1
     imprint: float = 3.4
     triple: float = 0.02
     module: float = 20.0
-    slack: float = 0.15
+    slack: float = 0.05
     misfit: tuple[float, ...] = (0.5, 0.26, 0.13, 0.07, 0.04)
-    unknown_level: tuple[float, ...] = (0.05, 0.15, 0.2, 0.2, 0.2, 0.2)
+    formula: tuple[float, ...] = (0.4, 0.4, 0.2)
+    unknown_level: tuple[float, ...] = (0.1, 0.3, 0.3, 0.3)
 
 
 CALIBRATION = Calibration()
@@ -52,34 +60,38 @@ NONE, UNKNOWN = (), ("unknown",)
 
 @dataclass(frozen=True, eq=False)
 class Evidences:
-    """Log evidences of one unit: ``slow`` by effects (misfit levels,), ``unexplained`` (2, kinds, levels), ``fast`` by name."""
+    """Log evidences of one unit: by effects or, ``fast``, by name.
+
+    ``slow`` has shape (misfit levels, formula errors), ``unexplained`` (kinds, levels, formula errors).
+    """
 
     slow: dict[tuple[str, ...], np.ndarray]
-    unexplained: np.ndarray
+    unexplained: dict[tuple[str, ...], np.ndarray]
     fast: dict[str, float]
 
     @classmethod
     def of(cls, candidates: Candidates, fast: Fast) -> Evidences:
         """From fitted hypotheses and fast structure."""
         slow = {tuple(sorted(w.effects)): w.log_evidence for w in candidates.weighed}
-        return cls(slow, candidates.unexplained, dict(fast.log_evidence))
+        unexplained = {tuple(sorted(effects)): values for effects, values in candidates.unexplained.items()}
+        return cls(slow, unexplained, dict(fast.log_evidence))
 
     def as_json(self) -> dict:
         """Plain JSON data."""
-        slow = [[list(k), v.tolist()] for k, v in self.slow.items()]
-        return {"slow": slow, "unexplained": self.unexplained.tolist(), "fast": self.fast}
+        slow, unexplained = ([[list(k), v.tolist()] for k, v in kept.items()] for kept in (self.slow, self.unexplained))
+        return {"slow": slow, "unexplained": unexplained, "fast": self.fast}
 
     @classmethod
     def from_json(cls, kept: dict) -> Evidences:
         """What :meth:`as_json` gave."""
-        slow = {tuple(names): np.array(values) for names, values in kept["slow"]}
-        return cls(slow, np.array(kept["unexplained"]), kept["fast"])
+        slow, unexplained = ({tuple(k): np.array(v) for k, v in kept[part]} for part in ("slow", "unexplained"))
+        return cls(slow, unexplained, kept["fast"])
 
 
 def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects, () for none and ("unknown",) for something not in the library; they sum to one."""
     quick = _fast(evidences.fast, calibration)
-    slow = {hot: _slow(evidences, calibration, calibration.temperature * hot) for hot in (1.0, calibration.imprint)}
+    slow = {hot: _slow(evidences, calibration, hot) for hot in (1.0, calibration.imprint)}
     joint: dict[tuple[str, ...], float] = {}
     for name, q in quick.items():
         for effects, p in slow[calibration.imprint if name == STICK_SLIP else 1.0].items():
@@ -97,17 +109,20 @@ def _union(effects, fast):
     return effects if fast is None or fast in effects else tuple(sorted((*effects, fast)))
 
 
-def _slow(evidences, c, temperature):
-    misfit = np.log(c.misfit)
+def _slow(evidences, c, hot):
+    misfit, kinds = (np.log(weights)[:, None] + np.log(c.formula) for weights in (c.misfit, c.unknown_level))
+    value = {effects: logsumexp(values + misfit) for effects, values in evidences.slow.items()}
+    gain = {effects: v - value[NONE] for effects, v in value.items()}
+    most = max(gain.values())
+    temperature = hot * (c.cool + (c.warm - c.cool) * most / (most + c.halfway))
     share = _prior([effects[0] for effects in evidences.slow if len(effects) == 1], c)
-    score = {
-        effects: np.log(share(effects)) + logsumexp(values + misfit) / temperature for effects, values in evidences.slow.items()
-    }
-    kinds = np.log(np.array(c.unknown_level)[None, None, :] / evidences.unexplained.shape[1])
-    explained = max(logsumexp(values + misfit) for values in evidences.slow.values()) - logsumexp(evidences.slow[NONE] + misfit)
-    alone, beside = (logsumexp(evidences.unexplained + kinds, axis=(1, 2)) - c.slack * explained) / temperature
-    # What the best effect leaves is mostly the error of its formula and of the baseline's.
-    score[UNKNOWN] = np.logaddexp(np.log(c.unknown) + alone, np.log(c.remainder) + beside)
+    score = {effects: np.log(share(effects)) + g / temperature for effects, g in gain.items()}
+    strange = []
+    for effects, values in evidences.unexplained.items():
+        more = logsumexp(values + kinds) - np.log(len(values)) - value[effects] - c.slack * max(gain[effects], 0.0)
+        weight = c.unknown if effects == NONE else c.remainder * share(effects)
+        strange.append(np.log(weight) + gain[effects] / temperature + more / (hot * c.strange))
+    score[UNKNOWN] = logsumexp(strange)
     return _normalised(score)
 
 

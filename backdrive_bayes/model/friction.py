@@ -44,8 +44,9 @@ class Friction:
 
     def respond(self, values, drive):
         """Transmitted torque [N·m] of shape (…, samples)."""
-        level, start = values["friction_torque"] / drive.rated_torque_nm, values["initial_friction_state"]
-        shared = (level, values["friction_ratio"], values["friction_spread"], values["load_spread"], values["free_share"])
+        factor, start = drive.friction_factor, values["initial_friction_state"]
+        level, ratio = factor * values["friction_torque"] / drive.rated_torque_nm, factor * values["friction_ratio"]
+        shared = (level, ratio, values["friction_spread"], values["load_spread"], values["free_share"])
         weights = _weights(*((np.shape(v), np.asarray(v, float).tobytes()) for v in shared))
         past = np.concatenate([weights * np.maximum(start, 0), weights * np.maximum(-start, 0)], axis=-1)
         if np.ndim(drive.shift_nm) == 0:
@@ -53,9 +54,9 @@ class Friction:
         return _passed_shifted(drive, weights, past)
 
 
-@functools.lru_cache(maxsize=2)
+@functools.lru_cache(maxsize=8)
 def _weights(*shared: tuple[tuple[int, ...], bytes]) -> np.ndarray:
-    """Weights of the bank's elements, shape (…, elements); the records of a unit ask for the same ones in turn."""
+    """Weights of the bank's elements, shape (…, elements); records of equal friction ask for the same ones in turn."""
     level, ratio, spread, load_spread, free = (np.frombuffer(data).reshape(shape) for shape, data in shared)
     constant, load = hat_weights(CONSTANT_SHARES, level, spread), hat_weights(LOAD_RATIOS, ratio, load_spread)
     weights = (constant[..., :, None] * load[..., None, :]).reshape(*constant.shape[:-1], -1)

@@ -41,7 +41,7 @@ class Geometric:
 
     def respond(self, values, drive):
         """Angle [rad] of shape (…, samples)."""
-        drag, width, late = values["drag_torque"], values["engagement_torque"], values["late_share"]
+        drag, width, late = drive.drag_factor * values["drag_torque"], values["engagement_torque"], values["late_share"]
         share, release, narrow = values["release_share"], values["release_torque"], values["release_width_ratio"]
         # Never beyond the drag in its own width: the boundaries must not cross.
         release = narrow * drag * release / (drag + release)

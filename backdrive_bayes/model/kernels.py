@@ -6,6 +6,8 @@ to some 1e-15, which compilers turn into vector instructions.
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
@@ -89,3 +91,21 @@ def gap_positions(torque, leg_stop, leg_direction, leg_end, begin, steps, place,
             last = direction * end[0]
             middle, below, above = direction * max(last, a), direction * max(last, b), direction * max(last, c)
             first = leg_stop[k]
+
+
+@_compiled
+def relaxed(signal, step, constant, start, out):
+    """First-order relaxation towards a signal that is straight between its samples; into ``out`` (walkers, samples).
+
+    ``signal`` (walkers, samples), ``step`` (samples - 1,) in s, ``constant`` and ``start`` (walkers,).
+    """
+    for w in range(out.shape[0]):
+        state = start[w]
+        out[w, 0] = state
+        for i in range(step.size):
+            ratio = step[i] / constant[w]
+            lost = -math.expm1(-ratio)
+            # Weight of the interval's end.
+            late = 1.0 - lost / ratio if ratio > 1e-9 else 0.5 * ratio
+            state = (1.0 - lost) * state + late * signal[w, i + 1] + (lost - late) * signal[w, i]
+            out[w, i + 1] = state

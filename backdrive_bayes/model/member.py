@@ -17,11 +17,13 @@ class Stage(enum.IntEnum):
 
     TORQUE_CHANNEL = 1
     """Error of the torque reading [N·m], the same at all samples, shape (…, 1): the reducer feels the reading less this."""
-    TRANSMISSION = 2
+    FRICTION_LEVEL = 2
+    """Factors on the torques at which friction and the clearance's drag hold, a pair of shape (…, 1) each."""
+    TRANSMISSION = 3
     """Turns the torque on the reducer into the torque that reaches the elastic parts [N·m]."""
-    COMPLIANCE = 3
+    COMPLIANCE = 4
     """Adds output angle [rad]."""
-    ANGLE_CHANNEL = 4
+    ANGLE_CHANNEL = 5
     """Adds to the angle that is read [rad] what is no motion of the reducer."""
 
     @property
@@ -35,13 +37,16 @@ class Drive:
     """What a member sees.
 
     The path that is read and T_r; ``transmitted_nm`` (…, samples), the torque that reaches the elastic parts; ``shift_nm``
-    (scalar or (…, 1)), the error of the torque reading; ``angle_rad`` (…, samples), the angle before the angle channel.
+    (scalar or (…, 1)), the error of the torque reading; ``friction_factor`` and ``drag_factor`` (scalar or (…, 1)), how much
+    more friction and drag hold back than the baseline's level; ``angle_rad`` (…, samples), the angle before the angle channel.
     """
 
     path: TorquePath
     rated_torque_nm: float
     transmitted_nm: np.ndarray | None = None
     shift_nm: float | np.ndarray = 0.0
+    friction_factor: float | np.ndarray = 1.0
+    drag_factor: float | np.ndarray = 1.0
     angle_rad: np.ndarray | None = None
 
     @property

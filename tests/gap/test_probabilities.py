@@ -7,18 +7,24 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.gap.candidates import MISFIT_LEVELS, UNKNOWN_KINDS, UNKNOWN_LEVELS
+from backdrive_bayes.gap.evidence import FORMULA_ERRORS
 from backdrive_bayes.gap.fast import Fast
 from backdrive_bayes.gap.probabilities import CALIBRATION, Evidences, credible_set, marginal, probabilities
 
 QUIET = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": -3.0}, {})
-LEVELS = -np.arange(len(MISFIT_LEVELS), dtype=float)
+LEVELS = -np.arange(len(MISFIT_LEVELS), dtype=float)[:, None] + np.zeros(len(FORMULA_ERRORS))
 
 
-def candidates(unexplained=-50.0, **gains):
-    """Hypotheses whose evidence beats the baseline's by the given gains; pairs are written a__b."""
+def candidates(unexplained=-50.0, beside=-15.0, **gains):
+    """Hypotheses whose evidence beats the baseline's by the given gains; pairs are written a__b.
+
+    Unexplained structure gains ``unexplained`` on the baseline, and ``beside`` on the best other hypothesis.
+    """
     weighed = [SimpleNamespace(effects=(), log_evidence=LEVELS)]
     weighed += [SimpleNamespace(effects=tuple(k.split("__")), log_evidence=LEVELS + v) for k, v in gains.items()]
-    rest = np.full((2, len(UNKNOWN_KINDS), len(UNKNOWN_LEVELS)), unexplained)
+    best = max(weighed[1:], key=lambda w: w.log_evidence.max())
+    flat = np.zeros((len(UNKNOWN_KINDS), len(UNKNOWN_LEVELS), len(FORMULA_ERRORS)))
+    rest = {(): flat + unexplained, best.effects: flat + best.log_evidence.max() + beside}
     return SimpleNamespace(weighed=tuple(weighed), none=weighed[0], unexplained=rest)
 
 
@@ -41,6 +47,11 @@ def test_a_strong_effect_is_named_and_a_stronger_rest_is_unknown():
     assert named["sensor_lag"] > 0.9
     rest = labels(candidates(sensor_lag=100.0, thermal_drift=0.0, unexplained=250.0))
     assert rest["unknown"] > 0.9
+
+
+def test_what_an_effect_leaves_unexplained_makes_it_doubtful():
+    found = [labels(candidates(sensor_lag=100.0, beside=v)).get("unknown", 0.0) for v in (-15.0, 5.0, 40.0)]
+    assert found[0] < 0.05 and found[0] < found[1] < found[2] and found[2] > 0.9
 
 
 def test_a_module_that_every_reducer_has_comes_first():
@@ -74,7 +85,8 @@ def test_credible_set_is_the_smallest_that_holds_the_level():
 def test_priors_are_a_distribution():
     c = CALIBRATION
     assert c.none + c.single + c.pair + c.unknown == pytest.approx(1.0)
-    assert len(c.misfit) == len(c.misfit) == len(MISFIT_LEVELS)
+    assert len(c.misfit) == len(MISFIT_LEVELS) and len(c.unknown_level) == len(UNKNOWN_LEVELS)
+    assert len(c.formula) == len(FORMULA_ERRORS) and sum(c.formula) == pytest.approx(1.0)
     assert sum(c.misfit) == pytest.approx(1.0) and sum(c.unknown_level) == pytest.approx(1.0)
 
 

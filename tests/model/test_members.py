@@ -21,10 +21,11 @@ from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import BASELINE, MEMBERS, members_named
 
 NAMES = tuple(MEMBERS)
-HISTORY = {
+ODD = {
     "initial_gap_position", "initial_friction_state", "initial_second_gap_position", "initial_creep", "initial_slip",
-    "torque_offset",
+    "torque_offset", "second_unevenness",
 }  # fmt: skip
+"""Parameters of the past, and others, that change sign with the torque."""
 ONE_SIDED = {"asymmetric_stiffness", "encoder_error", "thermal_drift"}
 """Effects that single out a direction of the torque or of the angle, or heed neither."""
 
@@ -120,11 +121,11 @@ def test_member_does_not_change_its_inputs(name):
 def test_negated_torque_and_past_give_the_negated_angle(name):
     model, torque = own_model(name), random_torques(np.random.default_rng(4))
     values = prior_values(model, np.random.default_rng(5), 20)
-    mirrored = {k: -v if k in HISTORY else v for k, v in values.items()}
+    mirrored = {k: -v if k in ODD else v for k, v in values.items()}
     there = model.angle(values, TorquePath.from_samples(torque))
     back = model.angle(mirrored, TorquePath.from_samples(-torque))
     np.testing.assert_allclose(back, -there, rtol=0, atol=1e-12 * np.abs(there).max())
-    if HISTORY & set(values):
+    if ODD & set(values):
         unflipped = model.angle(values, TorquePath.from_samples(-torque))
         assert np.abs(unflipped + there).max() > 1e-3 * np.abs(there).max(), (
             "the past must matter for this test to see it"
