@@ -6,6 +6,7 @@ import pytest
 from emcee.moves import DEMove, DESnookerMove
 from support.targets import Banana, agrees, along_the_ridge, disagreement, moments_by_importance
 
+from backdrive_bayes.inference import sampling
 from backdrive_bayes.inference.sampling import IndependenceMove, Settings, begin_ensembles, run_ensembles, warm_up
 
 ENSEMBLES, WALKERS = 8, 64
@@ -150,3 +151,43 @@ def test_a_burn_in_that_was_cut_short_is_told_and_made_up_for():
     assert not cut.burnt_in and not drawn.burnt_in
     later = run_ensembles(Banana.log_posterior, cut, rng, settings, lambda d: d.burnt_in, lambda: 1e9)
     assert later.burnt_in
+
+
+class Exchange:
+    """Two coordinates whose exponentials must add up to two: a curved ridge, far longer than its width."""
+
+    dimension, width = 12, 0.02
+
+    @classmethod
+    def log_posterior(cls, z):
+        z = np.atleast_2d(z)
+        excess = np.exp(z[:, 0]) + np.exp(z[:, 1]) - 2
+        return -0.5 * (excess / cls.width) ** 2 - 0.5 * np.sum(z**2, axis=1)
+
+    @classmethod
+    def low_quantile(cls):
+        """5 % quantile of the first coordinate, by quadrature along the ridge."""
+        one = np.linspace(-6, np.log(2) - 1e-6, 100_001)
+        other = np.log(2 - np.exp(one))
+        share = np.cumsum(np.exp(-0.5 * (one**2 + other**2) - other))
+        return float(np.interp(0.05, share / share[-1], one))
+
+    @classmethod
+    def sampled(cls, seed):
+        gradient = np.zeros((1, cls.dimension))
+        gradient[0, :2] = 1 / cls.width
+        covariance = np.linalg.inv(np.eye(cls.dimension) + gradient.T @ gradient)
+        rng, settings = np.random.default_rng(seed), Settings(walkers=192)
+        start = np.empty((0, cls.dimension))
+        proposal, _ = warm_up(cls.log_posterior, np.zeros(cls.dimension), covariance, start, rng, settings, lambda: 1e9)
+        chains = begin_ensembles(cls.log_posterior, proposal, rng, settings, lambda: 1e9)
+        drawn = run_ensembles(cls.log_posterior, chains, rng, settings, lambda drawn: drawn.steps >= 80, lambda: 1e9)
+        return float(np.quantile(drawn.z[..., 0], 0.05))
+
+
+def test_walkers_find_the_ends_of_a_curved_ridge(monkeypatch):
+    far = Exchange.low_quantile()
+    assert Exchange.sampled(0) < 0.65 * far
+    # The planted fault: begun at once at the posterior's own temperature they stay near its mode.
+    monkeypatch.setattr(sampling, "TEMPERATURES", ())
+    assert Exchange.sampled(0) > 0.45 * far
