@@ -122,13 +122,13 @@ def show(result):
 
 def with_values(values):
     """A calibration from free values: temperatures above one, prior weights that sum to one."""
-    warm, cool, halfway, strange, ft, fast, slope, rising, remainder, imprint, slack, exact, loose, *prior = values
+    warm, cool, halfway, ft, fast, slope, rising, remainder, imprint, slack, exact, loose, *prior = values
     none, single, pair, unknown = np.exp(prior) / np.exp(prior).sum()
     misfit = np.exp(-np.exp(slope) * np.arange(len(CALIBRATION.misfit)))
     level = np.exp(rising * np.arange(len(CALIBRATION.unknown_level)))
     formula = np.exp([exact, 0.0, loose])
     return replace(
-        CALIBRATION, warm=1 + np.exp(warm), cool=1 + np.exp(cool), halfway=np.exp(halfway), strange=1 + np.exp(strange),
+        CALIBRATION, warm=1 + np.exp(warm), cool=1 + np.exp(cool), halfway=np.exp(halfway),
         fast_temperature=1 + np.exp(ft), none=none, single=single, pair=pair, unknown=unknown,
         imprint=1 + np.exp(imprint), fast=1 / (1 + np.exp(-fast)), misfit=tuple(misfit / misfit.sum()),
         unknown_level=tuple(level / level.sum()), formula=tuple(formula / formula.sum()),
@@ -137,7 +137,7 @@ def with_values(values):
 
 
 START = np.concatenate([
-    np.log([5.0, 1.0, 40.0, 2.0, 6.0]), [-2.2, -0.4, 0.0], np.log([0.3, 2.5, 0.05, 1.0, 0.5, 0.4, 0.44, 0.01, 0.15]),
+    np.log([5.0, 1.0, 40.0, 6.0]), [-2.2, -0.4, 0.0], np.log([0.3, 2.5, 0.05, 1.0, 0.5, 0.4, 0.44, 0.01, 0.15]),
 ])  # fmt: skip
 
 

@@ -28,7 +28,7 @@ class FitOptions:
     def __post_init__(self):
         from backdrive_bayes.model.registry import members_named
 
-        members_named(self.baseline)
+        members_named(self.baseline, "--baseline")
         for name, value, top in (("--k", self.k, 1.0), ("--level", self.level, 1.0), ("--budget", self.seconds, 1e7)):
             if not 0 < value < top:
                 raise BadInput(name, f"a number between 0 and {top:g}", value)

@@ -36,10 +36,11 @@ class Fast:
     period: dict[str, float]
 
     def within(self, allowed) -> Fast:
-        """What of it a library of the ``allowed`` effects knows (None: all), and vibration, which is of no library."""
+        """The same to a library of the ``allowed`` effects only (None: all): what it has no name for counts as vibration does."""
         if allowed is None:
             return self
-        return replace(self, log_evidence={n: v for n, v in self.log_evidence.items() if n in allowed or n == VIBRATION})
+        known = {n: v for n, v in self.log_evidence.items() if n in allowed}
+        return replace(self, log_evidence=known | {VIBRATION: max(v for n, v in self.log_evidence.items() if n not in known)})
 
 
 def weigh_fast(setting: Setting, fitted: Fitted) -> Fast:

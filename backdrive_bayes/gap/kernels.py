@@ -11,6 +11,8 @@ SAME_LOOP = 0.05
 """Relative difference of amplitudes below which two records run the same loop."""
 FIRST_LEG_SHARED = 0.5
 SHARP = 6.0
+RIPPLE = 0.3
+"""Error of the torque at which a record's steps come, in standard deviations of the torque's noise."""
 STEEP, TURNING = 3.0, 1.0
 """Misfit of the baseline in noise units where the loop is more than ten times as steep as usual, and just after a reversal."""
 
@@ -32,6 +34,7 @@ class Places:
         span = np.array([np.ptp(d.blocks.angle_rad) for d in data])
         self.relative = (span / span.max())[self.record]
         self.uncertain = np.concatenate([_uncertain(problem, z, r) for r in range(len(data))])
+        self.ripple = np.concatenate([_ripple(problem, z, r) for r in range(len(data))])
 
     def _same_record(self):
         return self.record[:, None] == self.record
@@ -64,6 +67,13 @@ class Places:
         """Misfit at steps and reversals, where the baseline's formulas are known least, in noise units squared."""
         return np.outer(self.uncertain, self.uncertain) * self.misfit(length)
 
+    def early_steps(self) -> np.ndarray:
+        """Covariance [rad²] of steps that come early or late, both ways alike, by an amount of each record's own.
+
+        Ripple of the torque dithers friction and drag, the more the slower the loading, and samples have a width.
+        """
+        return self._same_record() * np.outer(self.ripple, self.ripple)
+
     def own_loop(self, length: float) -> np.ndarray:
         """The same, each record by itself."""
         apart = np.abs(self.phase[:, None] - self.phase)
@@ -81,13 +91,24 @@ class Places:
         return self._scaled(self._same_record() * np.exp(-apart))
 
 
+def _slope(problem, z, record):
+    """|dθ/dτ| [rad/(N·m)] of a record along the baseline's loop, shape (blocks,)."""
+    data = problem.records[record]
+    angle = problem.model.angle(problem.values(z, record), data.path)
+    run = np.maximum(np.abs(np.gradient(data.blocks.torque_nm)), 1e-4 * amplitude_nm(problem, record))
+    return np.abs(np.gradient(angle)) / run
+
+
+def _ripple(problem, z, record):
+    """What a later step takes from the angle [rad], one standard deviation, shape (blocks,)."""
+    data = problem.records[record]
+    return RIPPLE * data.noise.torque_nm * data.path.direction * _slope(problem, z, record)
+
+
 def _uncertain(problem, z, record):
     """Size of the baseline's misfit at the steps and reversals of a record, in noise units, shape (blocks,)."""
-    data = problem.records[record]
-    blocks, amplitude = data.blocks, amplitude_nm(problem, record)
-    angle = problem.model.angle(problem.values(z, record), data.path)
-    run = np.maximum(np.abs(np.gradient(blocks.torque_nm)), 1e-4 * amplitude)
-    slope = np.abs(np.gradient(angle)) / run
+    blocks, amplitude = problem.records[record].blocks, amplitude_nm(problem, record)
+    slope = _slope(problem, z, record)
     steep = np.clip((slope / np.median(slope) - 1) / 9, 0, 1)
     begin = blocks.turning_nm[blocks.leg]
     turning = np.where(blocks.leg > 0, np.exp(-np.abs(blocks.torque_nm - begin) / (0.1 * amplitude)), 0.0)

@@ -7,7 +7,6 @@ on simulated units of a virtual bench that shares no formula with the models (st
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,33 +24,32 @@ class Calibration:
     ``misfit`` follows ``MISFIT_LEVELS``, ``formula`` ``FORMULA_ERRORS``, ``unknown_level`` ``UNKNOWN_LEVELS``.
 
     The temperature of slow evidences rises from ``cool``, where nothing but noise is weighed, towards ``warm``, where formulas
-    are approximate beyond the noise; it is halfway where the best hypothesis gains ``halfway`` on the baseline. Structure that
-    a hypothesis leaves unexplained is weighed at a temperature of its own, ``strange``, after ``slack`` is taken off, the share
-    of what effects explain that counts as their formulas' error. ``unknown`` is the weight of something else and no effect,
+    are approximate beyond the noise; it is halfway where ``halfway`` is gained, by the best hypothesis on the baseline or by
+    unexplained structure beside a hypothesis. From the latter ``slack`` is taken off, the share of what effects explain that
+    counts as their formulas' error. ``unknown`` is the weight of something else and no effect,
     ``remainder`` of something else beside an effect, relative to that effect. ``imprint`` multiplies the temperature of slow
     evidences beside stick-slip, whose jumps leave traces in wide blocks that no slow model explains; ``triple`` is the share
-    left to three effects at once, or to fast structure with something unknown beside it. ``module`` is how much likelier than an
-    effect a module is that every reducer has and the baseline was asked to do without.
+    left to three effects at once, or to fast structure with something unknown beside it. ``module`` are the odds of a
+    module that every reducer has and the baseline was asked to do without, whatever else there is.
     """
 
-    cool: float = 2.0
-    warm: float = 6.0
+    cool: float = 3.5
+    warm: float = 13.0
     halfway: float = 40.0
-    strange: float = 3.0
-    fast_temperature: float = 8.0
-    none: float = 0.4
-    single: float = 0.445
-    pair: float = 0.005
-    unknown: float = 0.15
-    remainder: float = 0.3
-    fast: float = 0.1
+    fast_temperature: float = 12.0
+    none: float = 0.5
+    single: float = 0.27
+    pair: float = 0.02
+    unknown: float = 0.21
+    remainder: float = 1.0
+    fast: float = 0.05
     imprint: float = 3.4
     triple: float = 0.02
     module: float = 20.0
-    slack: float = 0.05
-    misfit: tuple[float, ...] = (0.5, 0.26, 0.13, 0.07, 0.04)
-    formula: tuple[float, ...] = (0.4, 0.4, 0.2)
-    unknown_level: tuple[float, ...] = (0.1, 0.3, 0.3, 0.3)
+    slack: float = 0.1
+    misfit: tuple[float, ...] = (0.76, 0.18, 0.04, 0.015, 0.005)
+    formula: tuple[float, ...] = (0.75, 0.22, 0.03)
+    unknown_level: tuple[float, ...] = (0.6, 0.25, 0.1, 0.05)
 
 
 CALIBRATION = Calibration()
@@ -114,27 +112,32 @@ def _slow(evidences, c, hot):
     value = {effects: logsumexp(values + misfit) for effects, values in evidences.slow.items()}
     gain = {effects: v - value[NONE] for effects, v in value.items()}
     most = max(gain.values())
-    temperature = hot * (c.cool + (c.warm - c.cool) * most / (most + c.halfway))
+    temperature = _temperature(c, most, hot)
     share = _prior([effects[0] for effects in evidences.slow if len(effects) == 1], c)
     score = {effects: np.log(share(effects)) + g / temperature for effects, g in gain.items()}
     strange = []
     for effects, values in evidences.unexplained.items():
         more = logsumexp(values + kinds) - np.log(len(values)) - value[effects] - c.slack * max(gain[effects], 0.0)
         weight = c.unknown if effects == NONE else c.remainder * share(effects)
-        strange.append(np.log(weight) + gain[effects] / temperature + more / (hot * c.strange))
+        strange.append(np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot))
     score[UNKNOWN] = logsumexp(strange)
     return _normalised(score)
 
 
+def _temperature(c, gain, hot):
+    return hot * (c.cool + (c.warm - c.cool) * gain / (gain + c.halfway))
+
+
 def _prior(names, c):
-    """Prior weight of none, of one effect or of two, as a function of them."""
+    """Prior weight of a set of effects, as a function of it: by how many they are, not counting modules held back."""
+    others = sum(name not in BASELINE for name in names)
+    shares = (c.none, c.single / max(others, 1), c.pair / max(others * (others - 1) / 2, 1))
 
-    def odds(effects):
-        return np.prod([c.module if name in BASELINE else 1.0 for name in effects])
+    def share(effects):
+        held_back = sum(name in BASELINE for name in effects)
+        return shares[len(effects) - held_back] * c.module**held_back
 
-    singles, pairs = (sum(odds(chosen) for chosen in itertools.combinations(names, n)) for n in (1, 2))
-    total, size = (1.0, max(singles, 1.0), max(pairs, 1.0)), (c.none, c.single, c.pair)
-    return lambda effects: size[len(effects)] * odds(effects) / total[len(effects)]
+    return share
 
 
 def _fast(fast, c):

@@ -75,11 +75,11 @@ class Setting:
         return Whitening.of(self.covariance(*terms), self.places.record)
 
     def covariance(self, *terms) -> np.ndarray:
-        """Noise, sharp misfit and more, (blocks, blocks).
+        """Noise, steps that come early or late, sharp misfit and more, (blocks, blocks).
 
         ``terms`` are (kernel name, length, standard deviation in noise units) each.
         """
-        covariance = self.noise + self.noise_rad**2 * self.kernel("sharp", MISFIT_LENGTH)
+        covariance = self.noise + self.places.early_steps() + self.noise_rad**2 * self.kernel("sharp", MISFIT_LENGTH)
         for name, length, deviation in terms:
             covariance += (deviation * self.noise_rad) ** 2 * self.kernel(name, length)
         return covariance

@@ -54,14 +54,14 @@ for _point in entry_points(group="backdrive_bayes.effects"):
     MEMBERS.setdefault(_member.name, _member)
 
 
-def members_named(names) -> tuple[Member, ...]:
-    """The members of the given names in the registry's order; BadInput on an unknown or repeated name."""
+def members_named(names, where: str = "model") -> tuple[Member, ...]:
+    """The members of the given names in the registry's order; BadInput, saying ``where``, on an unknown or repeated name."""
     names = list(names)
     for name in names:
         if name not in MEMBERS:
-            raise BadInput("model", f"names out of {', '.join(MEMBERS)}", repr(name))
+            raise BadInput(where, f"names out of {', '.join(MEMBERS)}", repr(name))
     if not names or len(set(names)) < len(names):
-        raise BadInput("model", "at least one member, each once", ",".join(names) or "none")
+        raise BadInput(where, "at least one member, each once", ",".join(names) or "none")
     return tuple(m for name, m in MEMBERS.items() if name in names)
 
 

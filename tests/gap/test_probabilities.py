@@ -57,7 +57,7 @@ def test_what_an_effect_leaves_unexplained_makes_it_doubtful():
 def test_a_module_that_every_reducer_has_comes_first():
     named = labels(candidates(geometric=60.0, sensor_lag=65.0))
     assert named["geometric"] > 3 * named["sensor_lag"]
-    assert labels(candidates(geometric=60.0, sensor_lag=120.0))["sensor_lag"] > 0.9
+    assert labels(candidates(geometric=60.0, sensor_lag=160.0))["sensor_lag"] > 0.9
 
 
 def test_a_pair_must_earn_its_place():
@@ -94,3 +94,11 @@ def test_evidences_survive_json():
     kept = Evidences.of(candidates(sensor_lag=3.0, sensor_lag__thermal_drift=4.0), QUIET)
     again = Evidences.from_json(json.loads(json.dumps(kept.as_json())))
     assert probabilities(again) == probabilities(kept)
+
+
+def test_fast_structure_without_a_name_in_the_library_is_unknown():
+    jumps = Fast({"encoder_error": -3.0, "stick_slip": 120.0, "vibration": -3.0}, {})
+    quiet = candidates(sensor_lag=-3.0, thermal_drift=-3.0)
+    assert next(iter(labels(quiet, jumps.within(["stick_slip", "sensor_lag"])))) == "stick_slip"
+    assert next(iter(labels(quiet, jumps.within(["encoder_error", "sensor_lag"])))) == "unknown"
+    assert jumps.within(None) is jumps
