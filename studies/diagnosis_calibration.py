@@ -6,7 +6,7 @@
 ``weigh`` draws units as a blind check does and keeps the log evidences of every hypothesis (evidences.jsonl, one line a unit;
 units that are there already are left alone). Every fifth unit is weighed once more with its true effect taken out of the library:
 the right answer is then unknown. Each line bears a fingerprint of the code behind it; others are not mixed in. ``set`` finds
-the calibration of highest mean log score over those units, and tells by ten-fold cross-validation what it is worth on units that
+the calibration of highest mean log score over those units, and tells by five-fold cross-validation what it is worth on units that
 it has not seen (calibration.json).
 """
 
@@ -17,6 +17,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
+import functools
 import hashlib
 import json
 import time
@@ -26,14 +27,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import minimize
 
 import backdrive_bayes
 from backdrive_bayes.bench.unit import draw_unit
 from backdrive_bayes.blind.calibration import calibration
 from backdrive_bayes.blind.key import label_of
 from backdrive_bayes.blind.request import Request, assign, draw_plan
-from backdrive_bayes.gap.candidates import weigh_all
+from backdrive_bayes.gap.candidates import MISFIT_LEVELS, UNKNOWN_LEVELS, weigh_all
 from backdrive_bayes.gap.fast import weigh_fast
 from backdrive_bayes.gap.probabilities import CALIBRATION, Evidences, credible_set, marginal, probabilities
 from backdrive_bayes.gap.setting import Setting
@@ -43,22 +43,24 @@ SEED = 77
 SEVERITIES = (1.0, 0.4, 0.2, 0.1)
 UNKNOWN = "unknown"
 CANDIDATES = candidates_beside(BASELINE)
-WEIGHED_LATER = ("probabilities.py", "diagnose.py", "next_test.py", "shrink.py", "where.py")
+WEIGHED_LATER = ("probabilities.py", "diagnose.py", "draws.py", "next_test.py", "shrink.py", "where.py")
 DIRT = (0.5, 3.0)
 """Level of the small faults that every bench has, from cleaner than usual to dirtier."""
 
 
+@functools.cache
 def fingerprint() -> str:
     """Hash of the code that the evidences come from; what turns them into probabilities is not part of it."""
     package = Path(backdrive_bayes.__file__).parent
-    files = sorted(p for part in ("bench", "gap", "inference", "model") for p in (package / part).rglob("*.py"))
+    parts = ("bench", "blind", "gap", "inference", "model", "records")
+    files = sorted(p for part in parts for p in (package / part).rglob("*.py"))
     return hashlib.sha256(b"".join(p.read_bytes() for p in files if p.name not in WEIGHED_LATER)).hexdigest()[:12]
 
 
 def weigh(job) -> dict:
     """Evidences of one unit, with its truth; without its first effect in the library if so asked."""
     warnings.simplefilter("ignore")
-    index, effects, removed = job
+    index, effects, removed, code = job
     rng = np.random.default_rng([SEED, index])
     bench = draw_unit(rng, effects, plan=draw_plan(Request(1), rng), dirt=float(rng.uniform(*DIRT)))
     began, rng = time.perf_counter(), np.random.default_rng(0)
@@ -73,7 +75,7 @@ def weigh(job) -> dict:
     ]
     return {
         "index": index, "removed": removed, "truth": UNKNOWN if removed else truth,
-        "severity": min(effects.values(), default=None), "planted": planted, "code": fingerprint(),
+        "severity": min(effects.values(), default=None), "planted": planted, "code": code,
         "evidences": Evidences.of(candidates, fast).as_json(), "seconds": time.perf_counter() - began,
     }  # fmt: skip
 
@@ -93,7 +95,7 @@ def run(options):
     jobs = []
     for i, chosen in enumerate(effects):
         listed = len(chosen) == 1 and next(iter(chosen)) in CANDIDATES
-        jobs += [(i, chosen, removed) for removed in (False, True) if not removed or (listed and i % 5 == 0)]
+        jobs += [(i, chosen, removed, fingerprint()) for removed in (False, True) if not removed or (listed and i % 5 == 0)]
     with ProcessPoolExecutor(options.workers) as pool, path.open("a") as file:
         for result in pool.map(weigh, [job for job in jobs if (job[0], job[2]) not in done]):
             file.write(json.dumps(result) + "\n")
@@ -120,36 +122,38 @@ def show(result):
     print(index, verdict, result["truth"], names, said, f"{result['seconds']:.0f} s", flush=True)
 
 
-def with_values(values):
-    """A calibration from free values: temperatures above one, prior weights that sum to one."""
-    warm, cool, halfway, ft, fast, slope, rising, remainder, imprint, slack, exact, loose, *prior = values
-    none, single, pair, unknown = np.exp(prior) / np.exp(prior).sum()
-    misfit = np.exp(-np.exp(slope) * np.arange(len(CALIBRATION.misfit)))
-    level = np.exp(rising * np.arange(len(CALIBRATION.unknown_level)))
-    formula = np.exp([exact, 0.0, loose])
-    return replace(
-        CALIBRATION, warm=1 + np.exp(warm), cool=1 + np.exp(cool), halfway=np.exp(halfway),
-        fast_temperature=1 + np.exp(ft), none=none, single=single, pair=pair, unknown=unknown,
-        imprint=1 + np.exp(imprint), fast=1 / (1 + np.exp(-fast)), misfit=tuple(misfit / misfit.sum()),
-        unknown_level=tuple(level / level.sum()), formula=tuple(formula / formula.sum()),
-        remainder=np.exp(remainder), slack=np.exp(slack),
-    )  # fmt: skip
+def falling(rate, count):
+    """Weights that fall by exp(-rate) from each to the next and sum to one."""
+    weights = np.exp(-rate * np.arange(count))
+    return tuple((weights / weights.sum()).tolist())
 
 
-START = np.concatenate([
-    np.log([5.0, 1.0, 40.0, 6.0]), [-2.2, -0.4, 0.0], np.log([0.3, 2.5, 0.05, 1.0, 0.5, 0.4, 0.44, 0.01, 0.15]),
-])  # fmt: skip
+GRID = {
+    "cool": (1.5, 2.0, 2.5, 3.5, 5.0), "warm": (4.0, 6.0, 9.0, 13.0), "halfway": (10.0, 20.0, 40.0, 80.0),
+    "remainder": (0.1, 0.3, 1.0), "slack": (0.0, 0.02, 0.05, 0.1), "unknown": (0.05, 0.1, 0.2, 0.3),
+    "formula": ((0.4, 0.4, 0.2), (0.6, 0.38, 0.02), (0.75, 0.22, 0.03), (0.9, 0.09, 0.01)),
+    "misfit": tuple(falling(r, len(MISFIT_LEVELS)) for r in (0.3, 0.7, 1.5)),
+    "unknown_level": tuple(falling(r, len(UNKNOWN_LEVELS)) for r in (-1.0, 0.0, 1.0)),
+    "pair": (0.002, 0.005, 0.01, 0.02, 0.03), "none": (0.3, 0.4, 0.5, 0.6), "fast_temperature": (5.0, 8.0, 12.0),
+    "fast": (0.05, 0.1, 0.2), "imprint": (2.0, 3.4),
+}  # fmt: skip
+"""Values that are tried, one entry of the calibration after another."""
 
 
-def find(results) -> np.ndarray:
-    """Free values of the highest mean log score, held near the start by a weak prior."""
+def find(results, passes: int = 2):
+    """The calibration of the highest mean log score by going through the grid entry by entry, from the present one."""
 
-    def loss(values):
-        chosen = with_values(values)
-        given = [told(r, chosen).get(r["truth"], 0.0) for r in results]
-        return -np.mean(np.log(np.maximum(given, 1e-4))) + 0.5 * np.sum((values - START) ** 2) / len(results)
+    def loss(chosen):
+        return -np.mean([np.log(max(told(r, chosen).get(r["truth"], 0.0), 1e-3)) for r in results])
 
-    return minimize(loss, START, method="Powell", options={"maxfev": 1500, "xtol": 0.02, "ftol": 1e-4}).x
+    best, least = CALIBRATION, loss(CALIBRATION)
+    for _ in range(passes):
+        for name, values in GRID.items():
+            tried = [replace(best, **{name: value}) for value in values]
+            losses = [loss(chosen) for chosen in tried]
+            if min(losses) < least - 1e-4:
+                best, least = tried[int(np.argmin(losses))], min(losses)
+    return best
 
 
 def kinds_of(pairs) -> dict:
@@ -186,13 +190,15 @@ def score(results, forecasts) -> dict:
 def settle(options):
     """Find the calibration and write what it is worth."""
     results = read(options.out / "evidences.jsonl")
-    fold = np.random.default_rng(0).permutation(len(results)) % 10
+    units = sorted({r["index"] for r in results})
+    fold_of = dict(zip(units, np.random.default_rng(0).permutation(len(units)) % 5, strict=True))
+    fold = np.array([fold_of[r["index"]] for r in results])
     unseen = [None] * len(results)
-    for k in range(10):
-        chosen = with_values(find([r for r, f in zip(results, fold, strict=True) if f != k]))
+    for k in range(5):
+        chosen = find([r for r, f in zip(results, fold, strict=True) if f != k])
         for i in np.flatnonzero(fold == k):
             unseen[i] = told(results[i], chosen)
-    best = with_values(find(results))
+    best = find(results)
     summary = {
         "units": len(results), "calibration": asdict(best), "cross_validated": score(results, unseen),
         "as_set_now": score(results, [told(r) for r in results]), "seen": score(results, [told(r, best) for r in results]),

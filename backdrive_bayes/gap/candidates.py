@@ -10,6 +10,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logsumexp
 
 from backdrive_bayes.gap.evidence import log_evidence
 from backdrive_bayes.gap.hypotheses import Fitted, Flexible, fit_none, fit_screened, polished, rebased, screen, simplified
@@ -45,6 +46,11 @@ class Weighed:
         """Names of the effects."""
         return self.fitted.effects
 
+    @property
+    def height(self) -> float:
+        """Log evidence over the formula errors under the misfit that suits it best, by which hypotheses are ranked."""
+        return float(logsumexp(self.log_evidence, axis=1).max())
+
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
@@ -61,7 +67,7 @@ class Candidates:
     @property
     def best(self) -> Weighed:
         """The hypothesis of the highest evidence under any misfit."""
-        return max(self.weighed, key=lambda w: w.log_evidence.max())
+        return max(self.weighed, key=lambda w: w.height)
 
     @property
     def none(self) -> Weighed:
@@ -80,7 +86,7 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
         screens[name] = screen(setting, none, name, reference, rng)
         singles[name] = fit_screened(screens[name], (name,), rng)
     weighed = [_weigh(setting, f) for f in (none, *singles.values())]
-    alone = {w.effects[0]: w.log_evidence.max() for w in weighed[1:]}
+    alone = {w.effects[0]: w.height for w in weighed[1:]}
     for pair in _promising_pairs(none, singles, screens, reference):
         note(f"effects {' + '.join(pair)}")
         known, other = sorted(pair, key=lambda n: -alone[n])
@@ -88,21 +94,21 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
         weighed.append(_weigh(setting, fit_screened(found, pair, rng)))
     weighed, settled = _settle(setting, _polish_best(setting, weighed, rng), rng)
     note("what nothing explains")
-    doubted = [weighed[0], *sorted(weighed[1:], key=lambda w: -w.log_evidence.max())[:DOUBTED]]
+    doubted = [weighed[0], *sorted(weighed[1:], key=lambda w: -w.height)[:DOUBTED]]
     return Candidates(tuple(weighed), {w.effects: _unexplained(setting, w.fitted) for w in doubted}, settled)
 
 
 def _polish_best(setting, weighed, rng):
     """The few most probable hypotheses, and the baseline, climbed to the end; what they hold begun anew from their modes."""
     table = {w.effects: w for w in weighed}
-    order = sorted(table, key=lambda e: -table[e].log_evidence.max())
+    order = sorted(table, key=lambda e: -table[e].height)
     for effects in {(): None, **dict.fromkeys(order[:POLISHED])}:
         table[effects] = _better(table[effects], _weigh(setting, polished(table[effects].fitted, rng)))
-    best = max(table.values(), key=lambda w: w.log_evidence.max())
+    best = max(table.values(), key=lambda w: w.height)
     done = {(), best.effects, *order[:POLISHED]}
     for effects in (e for e in table if e not in done):
         table[effects] = _better(table[effects], _weigh(setting, rebased(table[effects].fitted, best.fitted)))
-    best = max(table.values(), key=lambda w: w.log_evidence.max())
+    best = max(table.values(), key=lambda w: w.height)
     parts = [effects for effects in table if len(effects) < len(best.effects) and set(effects) <= set(best.effects)]
     for effects in parts:
         simpler = polished(simplified(setting, best.fitted, effects, setting.whitening(REFERENCE)), rng)
@@ -116,8 +122,8 @@ def _settle(setting, weighed, rng):
     What a search still gains might be gained for the next best as well: half the lead is enough.
     """
     for _ in range(SEARCHES):
-        best, *others = sorted(weighed, key=lambda w: -w.log_evidence.max())
-        lead = best.log_evidence.max() - others[0].log_evidence.max() if others else 0.0
+        best, *others = sorted(weighed, key=lambda w: -w.height)
+        lead = best.height - others[0].height if others else 0.0
         again = polished(best.fitted, rng)
         before, after = best.fitted.problem.log_posterior(np.array([best.fitted.z, again.z]))
         if after <= before + max(SETTLED, 0.5 * lead):
@@ -128,7 +134,7 @@ def _settle(setting, weighed, rng):
 
 
 def _better(one, other):
-    return max(one, other, key=lambda w: w.log_evidence.max())
+    return max(one, other, key=lambda w: w.height)
 
 
 def _weigh(setting, fitted):

@@ -123,7 +123,7 @@ class _Found:
         inside = [w for w in self.candidates.weighed if set(w.effects) <= set(self.effects)]
         if self.effects == ("unknown",):
             return self.candidates.best
-        return max(inside, key=lambda w: (len(w.effects), w.log_evidence.max()))
+        return max(inside, key=lambda w: (len(w.effects), w.height))
 
     def _gap(self, gap):
         weight = gap.weight / gap.weight.sum()

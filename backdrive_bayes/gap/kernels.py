@@ -68,9 +68,9 @@ class Places:
         return np.outer(self.uncertain, self.uncertain) * self.misfit(length)
 
     def early_steps(self) -> np.ndarray:
-        """Covariance [rad²] of steps that come early or late, both ways alike, by an amount of each record's own.
+        """Covariance [rad²] of loops that are wider or narrower by a torque of each record's own, which shows at steps.
 
-        Ripple of the torque dithers friction and drag, the more the slower the loading, and samples have a width.
+        Ripple of the torque dithers friction and drag, more or less at each rate, and samples have a width.
         """
         return self._same_record() * np.outer(self.ripple, self.ripple)
 

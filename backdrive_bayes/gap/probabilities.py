@@ -19,7 +19,7 @@ from backdrive_bayes.model.registry import BASELINE
 
 @dataclass(frozen=True)
 class Calibration:
-    """Temperatures of slow and fast evidences, and prior weights.
+    """Temperatures of slow and fast evidences, and relative prior weights.
 
     ``misfit`` follows ``MISFIT_LEVELS``, ``formula`` ``FORMULA_ERRORS``, ``unknown_level`` ``UNKNOWN_LEVELS``.
 
@@ -94,7 +94,7 @@ def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) 
     for name, q in quick.items():
         for effects, p in slow[calibration.imprint if name == STICK_SLIP else 1.0].items():
             both = _union(effects, name)
-            more = len(both) > 2 or (effects == UNKNOWN and name not in (None, VIBRATION))
+            more = sum(name not in BASELINE for name in both) > 2 or (effects == UNKNOWN and name not in (None, VIBRATION))
             share = calibration.triple if more else 1.0
             joint[both] = joint.get(both, 0.0) + p * q * share
     total = sum(joint.values())
@@ -108,7 +108,7 @@ def _union(effects, fast):
 
 
 def _slow(evidences, c, hot):
-    misfit, kinds = (np.log(weights)[:, None] + np.log(c.formula) for weights in (c.misfit, c.unknown_level))
+    misfit, levels = (np.log(weights)[:, None] + np.log(c.formula) for weights in (c.misfit, c.unknown_level))
     value = {effects: logsumexp(values + misfit) for effects, values in evidences.slow.items()}
     gain = {effects: v - value[NONE] for effects, v in value.items()}
     most = max(gain.values())
@@ -117,7 +117,8 @@ def _slow(evidences, c, hot):
     score = {effects: np.log(share(effects)) + g / temperature for effects, g in gain.items()}
     strange = []
     for effects, values in evidences.unexplained.items():
-        more = logsumexp(values + kinds) - np.log(len(values)) - value[effects] - c.slack * max(gain[effects], 0.0)
+        more = logsumexp(values + levels) - np.log(len(values)) - value[effects]
+        more -= c.slack * (most if effects == NONE else gain[effects])
         weight = c.unknown if effects == NONE else c.remainder * share(effects)
         strange.append(np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot))
     score[UNKNOWN] = logsumexp(strange)

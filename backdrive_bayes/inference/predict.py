@@ -27,6 +27,9 @@ def predict_angles(posterior_nc: Path, time_s, torque_nm, *, rng, start: str = "
     _require_converged(posterior_nc, parameters)
     scale = Scale(float(parameters.attrs["rated_torque_nm"]), float(parameters.attrs["angle_scale_rad"]))
     model = ReducerModel(members_named(parameters.attrs["modules"].split(",")), scale)
+    lacking = [p.name for p in model.parameters if not p.per_record and p.name not in parameters]
+    if lacking:
+        raise BadInput(posterior_nc, f"the parameter {lacking[0]}", "none, in a fit of an earlier version: fit the unit again")
     chosen = rng.integers(parameters.sizes["chain"] * parameters.sizes["draw"], size=draws)
     values = {p.name: _values(p, parameters, chosen, scale, rng, start)[:, None] for p in model.parameters}
     path = TorquePath.from_samples(torque_nm, time_s)

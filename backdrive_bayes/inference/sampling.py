@@ -27,6 +27,8 @@ JITTER = 0.1
 TEMPERATURES = (64.0, 16.0, 4.0, 2.0)
 """Of the likelihood, through which the walkers cool, two blocks each: without it they stay on the part of a curved ridge where
 they set out, and 90 % intervals of parameters that stand in for each other covered four fifths."""
+LONGEST_COOLING = 0.3
+"""Share of the budget that is left."""
 LEAST_BLOCKS = 2
 """Blocks of differential evolution without which no proposal is believed: importance weights cannot see what it misses."""
 
@@ -143,8 +145,9 @@ def _cooled(log_posterior, state, rng, settings, seconds_left):
         log_prior = -0.5 * np.sum(z**2, axis=1)
         return log_prior + (log_posterior(z) - log_prior) / temperature
 
+    enough = (1 - LONGEST_COOLING) * seconds_left()
     for temperature in TEMPERATURES:
-        if seconds_left() <= 0:
+        if seconds_left() <= max(enough, 0.0):
             break
         sampler = _sampler(*state.shape, partial(tempered, temperature=temperature), CROWD_MOVES, rng)
         state = sampler.run_mcmc(state, 2 * settings.block, skip_initial_state_check=True).coords

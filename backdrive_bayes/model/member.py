@@ -68,6 +68,6 @@ class Member(Protocol):
     source: str
     signature: str
 
-    def respond(self, values: dict[str, np.ndarray], drive: Drive) -> np.ndarray:
+    def respond(self, values: dict[str, np.ndarray], drive: Drive) -> np.ndarray | tuple[np.ndarray, np.ndarray]:
         """Contribution along the path."""
         ...

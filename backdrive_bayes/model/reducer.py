@@ -40,11 +40,12 @@ class ReducerModel:
     def parts(self, values, path: TorquePath) -> dict[str, np.ndarray]:
         """Angle [rad] of each member, shape (…, samples) each; they add up to :meth:`angle`.
 
-        What a member of the transmission does is the change of the elastic angle when it acts, and a part of the torque channel
-        or of the friction's level is the change of the whole angle.
+        What a member of the transmission does is the change of the elastic angle when it acts, and a torque channel's part
+        is the change of the whole angle. Those of the friction's level have none: they act through friction and drag.
         """
-        drive, whole, parts = Drive(path, self.scale.torque_nm, path.torque_nm), self, {}
-        for member in (*self._at(Stage.TORQUE_CHANNEL), *self._at(Stage.FRICTION_LEVEL)):
+        drive = self._at_its_level(values, Drive(path, self.scale.torque_nm, path.torque_nm))
+        whole, parts = self, {m.name: np.zeros(path.torque_nm.shape) for m in self._at(Stage.FRICTION_LEVEL)}
+        for member in self._at(Stage.TORQUE_CHANNEL):
             others = replace(whole, members=tuple(m for m in whole.members if m is not member))
             parts[member.name] = whole.angle(values, path) - others.angle(values, path)
             whole = others
@@ -72,10 +73,13 @@ class ReducerModel:
         drive = Drive(path, self.scale.torque_nm)
         for member in self._at(Stage.TORQUE_CHANNEL):
             drive = replace(drive, shift_nm=drive.shift_nm + member.respond(values, drive))
+        return self._at_its_level(values, replace(drive, transmitted_nm=drive.torque_nm))
+
+    def _at_its_level(self, values, drive):
         for member in self._at(Stage.FRICTION_LEVEL):
             friction, drag = member.respond(values, drive)
             drive = replace(drive, friction_factor=drive.friction_factor * friction, drag_factor=drive.drag_factor * drag)
-        return replace(drive, transmitted_nm=drive.torque_nm)
+        return drive
 
     def _transmit(self, values, drive):
         for member in self._at(Stage.TRANSMISSION):

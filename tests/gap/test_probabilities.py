@@ -82,7 +82,7 @@ def test_credible_set_is_the_smallest_that_holds_the_level():
     assert credible_set(found, 0.5) == ["a"]
 
 
-def test_priors_are_a_distribution():
+def test_weights_are_as_many_as_what_they_weigh():
     c = CALIBRATION
     assert c.none + c.single + c.pair + c.unknown == pytest.approx(1.0)
     assert len(c.misfit) == len(MISFIT_LEVELS) and len(c.unknown_level) == len(UNKNOWN_LEVELS)

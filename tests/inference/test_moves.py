@@ -187,7 +187,7 @@ class Exchange:
 
 def test_walkers_find_the_ends_of_a_curved_ridge(monkeypatch):
     far = Exchange.low_quantile()
-    assert Exchange.sampled(0) < 0.65 * far
+    assert 0.65 < Exchange.sampled(0) / far < 1.25
     # The planted fault: begun at once at the posterior's own temperature they stay near its mode.
     monkeypatch.setattr(sampling, "TEMPERATURES", ())
-    assert Exchange.sampled(0) > 0.45 * far
+    assert Exchange.sampled(0) / far < 0.45

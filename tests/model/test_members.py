@@ -25,7 +25,7 @@ ODD = {
     "initial_gap_position", "initial_friction_state", "initial_second_gap_position", "initial_creep", "initial_slip",
     "torque_offset", "second_unevenness",
 }  # fmt: skip
-"""Parameters of the past, and others, that change sign with the torque."""
+"""Parameters that change sign with the torque: those of the past, an offset, a difference between the two ways."""
 ONE_SIDED = {"asymmetric_stiffness", "encoder_error", "thermal_drift"}
 """Effects that single out a direction of the torque or of the angle, or heed neither."""
 
@@ -145,12 +145,31 @@ def test_scaling_torque_and_angle_scales_the_result(name):
     np.testing.assert_allclose(big_angle, 5.0 * small_angle, rtol=0, atol=1e-11 * np.abs(big_angle).max())
 
 
-def test_parts_add_up_to_the_angle():
-    model, path = reducer(), zigzag()
+@pytest.mark.parametrize("name", NAMES)
+def test_parts_add_up_to_the_angle(name):
+    model, path = reducer({*BASELINE, name}), zigzag()
     values = prior_values(model, np.random.default_rng(8), 20)
     parts = model.parts(values, path)
-    assert set(parts) == set(BASELINE)
+    assert set(parts) == {*BASELINE, name}
     np.testing.assert_allclose(sum(parts.values()), model.angle(values, path), atol=1e-15)
+
+
+@pytest.mark.parametrize(("holding", "levels"), [
+    ("friction", {"friction_torque": 1.0, "friction_ratio": 1.0, "drag_torque": 0.5}),
+    ("load_dependent_friction", {"load_friction_ratio": 1.0, "drag_torque": 0.5}),
+])  # fmt: skip
+def test_friction_that_follows_the_rate_is_friction_at_another_level(holding, levels):
+    path, names = cycles(RATED, 1, 200), {"geometric", "elastic", holding}
+    model, plain = reducer({*names, "rate_dependent_friction"}), reducer(names)
+    values = as_arrays(typical_values(model) | {"friction_rate_exponent": 0.3, "friction_rate_bend": 0.0, "drag_follows": 0.5})
+    factor = (float(np.median(path.rate_nm_per_s)) / (0.5 * RATED)) ** 0.3
+    assert abs(factor - 1) > 0.1
+    at_level = {k: values[k] * factor**power for k, power in levels.items()}
+    expected, unchanged = plain.angle(values | at_level, path), plain.angle(values, path)
+    np.testing.assert_allclose(model.angle(values, path), expected, atol=1e-12 * np.abs(expected).max())
+    assert np.abs(expected - unchanged).max() > 1e-3 * np.abs(expected).max()
+    parts = model.parts(values, path)
+    np.testing.assert_allclose(parts["geometric"], plain.parts(values | at_level, path)["geometric"], atol=1e-15)
 
 
 def test_the_order_in_which_members_are_named_does_not_matter():

@@ -27,9 +27,10 @@ class LoadDependentFriction:
 
     def respond(self, values, drive):
         """Transmitted torque [N·m], shape (…, samples)."""
-        weights = hat_weights(LOAD_RATIOS, values["load_friction_ratio"], values["load_friction_spread"])
+        ratio = drive.friction_factor * values["load_friction_ratio"]
+        weights = hat_weights(LOAD_RATIOS, ratio, values["load_friction_spread"])
         passed = weights[..., :1] * drive.torque_nm
-        for i, ratio in enumerate(LOAD_RATIOS[1:], 1):
-            element = play(drive.path, lambda t, m=ratio: t - m * np.abs(t), np.zeros(1), drive.shift_nm)
+        for i, share in enumerate(LOAD_RATIOS[1:], 1):
+            element = play(drive.path, lambda t, m=share: t - m * np.abs(t), np.zeros(1), drive.shift_nm)
             passed = passed + weights[..., i : i + 1] * element
         return drive.transmitted_nm + passed - drive.torque_nm

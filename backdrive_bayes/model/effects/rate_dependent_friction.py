@@ -14,11 +14,11 @@ LARGEST = 8.0
 
 
 class RateDependentFriction:
-    """All torques at which friction holds are multiplied by exp(c x + b x²), x = ln(rate / (0.5 T_r/s)); no relaxation.
+    """Friction holds at torques multiplied by exp(c x + b x²), x = ln(rate / (0.5 T_r/s)); no relaxation.
 
     The logarithmic law of dry and boundary-lubricated contacts, as a power c of either sign so that friction stays positive; the
     bend b lets it level off or turn as Stribeck's curve does. The clearance's drag takes part by a power ``drag_follows`` of the
-    factor. The rate is the record's: its median over the samples.
+    factor. The rate is the record's, its median over the samples; the friction's grid bounds what is held.
     """
 
     name = "rate_dependent_friction"

@@ -12,7 +12,7 @@ from backdrive_bayes.model.parameter import LogNormal, LogUniform, Normal, Param
 
 STAGE = "weakly informative: a stage with more preload than the first"
 PARTS = (-0.8, -0.4, 0.0, 0.4, 0.8)
-"""Places p of equal shares of the teeth within the range of engagement; each engages over the ``OWN_WIDTH``-th part of it."""
+"""Places p of equal shares of the teeth within the range of engagement; each engages over ``OWN_WIDTH`` of it."""
 OWN_WIDTH = 0.4
 
 
