@@ -119,18 +119,25 @@ def _polish_best(setting, weighed, rng):
 def _settle(setting, weighed, rng):
     """The best hypothesis searched anew until that finds nothing that could matter; and whether it ever did so.
 
-    What a search still gains might be gained for the next best as well: half the lead is enough.
+    What a search still gains might be gained for the next best as well: half the lead is enough. Where the best one gained, the
+    next best are searched anew too.
     """
+    table, settled, gained = {w.effects: w for w in weighed}, False, False
     for _ in range(SEARCHES):
-        best, *others = sorted(weighed, key=lambda w: -w.height)
+        best, *others = sorted(table.values(), key=lambda w: -w.height)
         lead = best.height - others[0].height if others else 0.0
         again = polished(best.fitted, rng)
         before, after = best.fitted.problem.log_posterior(np.array([best.fitted.z, again.z]))
-        if after <= before + max(SETTLED, 0.5 * lead):
-            return weighed, True
-        better = _better(best, _weigh(setting, again))
-        weighed = [better if w is best else w for w in weighed]
-    return weighed, False
+        settled = bool(after <= before + max(SETTLED, 0.5 * lead))
+        if settled:
+            break
+        table[best.effects], gained = _better(best, _weigh(setting, again)), True
+    if gained:
+        best, *others = sorted(table.values(), key=lambda w: -w.height)
+        for other in (w for w in others[:POLISHED] if w.effects):
+            for again in (rebased(other.fitted, best.fitted), polished(other.fitted, rng)):
+                table[other.effects] = _better(table[other.effects], _weigh(setting, again))
+    return [table[w.effects] for w in weighed], settled
 
 
 def _better(one, other):

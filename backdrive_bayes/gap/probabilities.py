@@ -54,6 +54,8 @@ class Calibration:
 
 CALIBRATION = Calibration()
 NONE, UNKNOWN = (), ("unknown",)
+LARGE_MISFIT = 3
+"""Index in ``MISFIT_LEVELS`` from which on a misfit is larger than the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +123,10 @@ def _slow(evidences, c, hot):
         more -= c.slack * (most if effects == NONE else gain[effects])
         weight = c.unknown if effects == NONE else c.remainder * share(effects)
         strange.append(np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot))
+    for effects, values in evidences.slow.items():
+        # Where a hypothesis needs a misfit well beyond the noise, something is left that it does not explain.
+        large = logsumexp((values + misfit)[LARGE_MISFIT:]) - value[NONE]
+        strange.append(np.log(c.remainder * share(effects)) + large / temperature)
     score[UNKNOWN] = logsumexp(strange)
     return _normalised(score)
 

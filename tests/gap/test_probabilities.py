@@ -102,3 +102,10 @@ def test_fast_structure_without_a_name_in_the_library_is_unknown():
     assert next(iter(labels(quiet, jumps.within(["stick_slip", "sensor_lag"])))) == "stick_slip"
     assert next(iter(labels(quiet, jumps.within(["encoder_error", "sensor_lag"])))) == "unknown"
     assert jumps.within(None) is jumps
+
+
+def test_an_effect_that_needs_a_large_misfit_is_doubtful():
+    clean = candidates(sensor_lag=100.0)
+    rough = candidates(sensor_lag=100.0)
+    rough.weighed[1].log_evidence = rough.weighed[1].log_evidence[::-1]
+    assert labels(clean)["sensor_lag"] > 0.9 > 0.6 > labels(rough)["sensor_lag"]
