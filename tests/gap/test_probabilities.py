@@ -12,7 +12,7 @@ from backdrive_bayes.gap.fast import Fast
 from backdrive_bayes.gap.probabilities import CALIBRATION, Evidences, credible_set, marginal, probabilities
 
 QUIET = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": -3.0}, {})
-LEVELS = -np.arange(len(MISFIT_LEVELS), dtype=float)[:, None] + np.zeros(len(FORMULA_ERRORS))
+LEVELS = -np.geomspace(1.0, 400.0, len(MISFIT_LEVELS))[:, None] + np.zeros(len(FORMULA_ERRORS))
 
 
 def candidates(unexplained=-50.0, beside=-15.0, **gains):
