@@ -77,8 +77,8 @@ class Evidences:
         return cls(slow, unexplained, dict(fast.log_evidence))
 
     def as_json(self) -> dict:
-        """Plain JSON data."""
-        slow, unexplained = ([[list(k), v.tolist()] for k, v in kept.items()] for kept in (self.slow, self.unexplained))
+        """Plain JSON data, to a hundredth of a nat."""
+        slow, unexplained = ([[list(k), v.round(2).tolist()] for k, v in kept.items()] for kept in (self.slow, self.unexplained))
         return {"slow": slow, "unexplained": unexplained, "fast": self.fast}
 
     @classmethod
