@@ -18,7 +18,7 @@ from backdrive_bayes.figures.style import (
     styled,
 )
 
-LOOPS = "Settled loops of the units at the same rate and amplitude: median and interval of each."
+LOOPS = "Settled loops of the units at the same rate and amplitude, each about its middle: median and interval of each."
 ENERGY = "Torque–energy curves of the units at the same rate and amplitude: median and interval of each."
 RATIOS = (
     "Ratios of the indicators at matched rate and amplitude: median and interval, on a logarithmic scale. The grey band is the "
@@ -138,8 +138,10 @@ def _members(comparison, condition):
 
 def _one_loop(panel, record, look, name):
     loop = record["loop"]
+    # The encoder's zero is of no unit's making, and friction may hold a small loop far from the middle of a large one.
+    middle = np.mean([loop[branch]["median"] for branch in ("rising_rad", "falling_rad")])
     for i, branch in enumerate(("rising_rad", "falling_rad")):
-        lo, hi, median = (np.asarray(loop[branch][k]) * ARCMIN_PER_RAD for k in ("lo", "hi", "median"))
+        lo, hi, median = ((np.asarray(loop[branch][k]) - middle) * ARCMIN_PER_RAD for k in ("lo", "hi", "median"))
         panel.fill_between(loop["torque_Nm"], lo, hi, color=look["color"], alpha=0.3, linewidth=0)
         panel.plot(loop["torque_Nm"], median, color=look["color"], linestyle=look["linestyle"], label=None if i else name)
 
