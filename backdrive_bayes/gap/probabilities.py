@@ -25,8 +25,8 @@ class Calibration:
 
     The temperature of slow evidences rises from ``cool``, where nothing but noise is weighed, towards ``warm``, where formulas
     are approximate beyond the noise; it is halfway where ``halfway`` is gained, by the best hypothesis on the baseline or by
-    unexplained structure beside a hypothesis. From the latter ``slack`` is taken off, the share of what effects explain that
-    counts as their formulas' error. ``unknown`` is the weight of something else and no effect,
+    unexplained structure beside a hypothesis. From what is unexplained ``slack`` is taken off, the share of what
+    effects explain that counts as their formulas' error. ``unknown`` is the weight of something else and no effect,
     ``remainder`` of something else beside an effect, relative to that effect. ``imprint`` multiplies the temperature of slow
     evidences beside stick-slip, whose jumps leave traces in wide blocks that no slow model explains; ``triple`` is the share
     left to three effects at once, or to fast structure with something unknown beside it. ``module`` are the odds of a
@@ -125,7 +125,7 @@ def _slow(evidences, c, hot):
         strange.append(np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot))
     for effects, values in evidences.slow.items():
         # Where a hypothesis needs a misfit well beyond the noise, something is left that it does not explain.
-        large = logsumexp((values + misfit)[LARGE_MISFIT:]) - value[NONE]
+        large = logsumexp((values + misfit)[LARGE_MISFIT:]) - value[NONE] - c.slack * gain[effects]
         strange.append(np.log(c.remainder * share(effects)) + large / temperature)
     score[UNKNOWN] = logsumexp(strange)
     return _normalised(score)
