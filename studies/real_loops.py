@@ -1,8 +1,6 @@
 """Fit the eleven measured cycloidal units: convergence, preload trends, and small loops predicted from the large ones.
 
-    python studies/real_loops.py --data ../shared/data/cycloidal --out reports/real-loops --keep fits
-    backdrive-bayes compare fits/conic-preload-{1,2,4} fits/split-preload-{0,1,2} --claims studies/preload_claims.toml -o preload
-    backdrive-bayes report preload -o reports/preload/report.pdf
+    python studies/real_loops.py --data ../shared/data/cycloidal --out reports/real-loops
 
 Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
 """
@@ -22,8 +20,6 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.commands.output import write_folder
-from backdrive_bayes.commands.results import keep_fit
 from backdrive_bayes.indicators.summary import indicators_json, monitored
 from backdrive_bayes.inference.fit import fit
 from backdrive_bayes.inference.posterior_file import write_posterior
@@ -39,7 +35,7 @@ CREDIT = "github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, C
 def study_unit(job) -> dict:
     """Fit all loops, then the large ones alone, and predict the small ones from those."""
     warnings.simplefilter("ignore")
-    folder, out, keep, budget = job
+    folder, out, budget = job
     unit = read_unit(folder)
     settings = Settings(max_seconds=budget)
     posterior = fit(unit, seed=1, settings=settings, quantities=monitored(K))
@@ -49,9 +45,6 @@ def study_unit(job) -> dict:
         i = posterior.problem.labels.index(name)
         draws[name] = posterior.problem.physical(posterior.z)[::4, i].tolist()
     indicators = indicators_json(posterior, K)
-    if keep:
-        with write_folder(keep / unit.name) as kept:
-            keep_fit(posterior, indicators, kept, figures=False)
     result["indicators"] = [{"file": r["file"], **r["indicators"]} for r in indicators["records"]]
     result["draws"] = draws
     large = replace(unit, records=tuple(r for r in unit.records if r.name.startswith("large")))
@@ -117,7 +110,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/cycloidal"))
     parser.add_argument("--out", type=Path, default=Path("reports/real-loops"))
-    parser.add_argument("--keep", type=Path, help="folder for the results of all loops, to compare and report")
     parser.add_argument("--budget", type=float, default=200.0)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
@@ -125,7 +117,7 @@ def main():
     folders = sorted(p.parent for p in options.data.glob("*/unit.toml"))
     results = []
     with ProcessPoolExecutor(options.workers) as pool:
-        for result in pool.map(study_unit, [(f, options.out, options.keep, options.budget) for f in folders]):
+        for result in pool.map(study_unit, [(f, options.out, options.budget) for f in folders]):
             results.append(result)
             print(result["unit"], {k: result["all"][k] for k in ("converged", "max_rhat", "min_tail_ess", "seconds")},
                   "large only", result["large_only"]["converged"], "small predicted", result["small_predicted"], flush=True)

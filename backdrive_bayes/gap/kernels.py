@@ -33,8 +33,9 @@ class Places:
         self.same_loop = np.abs(np.log(amplitude[:, None] / amplitude)) < SAME_LOOP
         span = np.array([np.ptp(d.blocks.angle_rad) for d in data])
         self.relative = (span / span.max())[self.record]
-        self.uncertain = np.concatenate([_uncertain(problem, z, r) for r in range(len(data))])
-        self.ripple = np.concatenate([_ripple(problem, z, r) for r in range(len(data))])
+        slopes = [_slope(problem, z, r) for r in range(len(data))]
+        self.uncertain = np.concatenate([_uncertain(problem, r, slope) for r, slope in enumerate(slopes)])
+        self.ripple = np.concatenate([_ripple(d, slope) for d, slope in zip(data, slopes, strict=True)])
 
     def _same_record(self):
         return self.record[:, None] == self.record
@@ -67,7 +68,7 @@ class Places:
         """Misfit at steps and reversals, where the baseline's formulas are known least, in noise units squared."""
         return np.outer(self.uncertain, self.uncertain) * self.misfit(length)
 
-    def early_steps(self) -> np.ndarray:
+    def torque_ripple(self) -> np.ndarray:
         """Covariance [rad²] of loops that are wider or narrower by a torque of each record's own, which shows at steps.
 
         Ripple of the torque dithers friction and drag, more or less at each rate, and samples have a width.
@@ -99,16 +100,14 @@ def _slope(problem, z, record):
     return np.abs(np.gradient(angle)) / run
 
 
-def _ripple(problem, z, record):
+def _ripple(data, slope):
     """What a later step takes from the angle [rad], one standard deviation, shape (blocks,)."""
-    data = problem.records[record]
-    return RIPPLE * data.noise.torque_nm * data.path.direction * _slope(problem, z, record)
+    return RIPPLE * data.noise.torque_nm * data.path.direction * slope
 
 
-def _uncertain(problem, z, record):
+def _uncertain(problem, record, slope):
     """Size of the baseline's misfit at the steps and reversals of a record, in noise units, shape (blocks,)."""
     blocks, amplitude = problem.records[record].blocks, amplitude_nm(problem, record)
-    slope = _slope(problem, z, record)
     steep = np.clip((slope / np.median(slope) - 1) / 9, 0, 1)
     begin = blocks.turning_nm[blocks.leg]
     turning = np.where(blocks.leg > 0, np.exp(-np.abs(blocks.torque_nm - begin) / (0.1 * amplitude)), 0.0)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from backdrive_bayes.gap.candidates import Candidates
+from backdrive_bayes.gap.candidates import MISFIT_LEVELS, Candidates
 from backdrive_bayes.gap.fast import STICK_SLIP, VIBRATION, Fast
 from backdrive_bayes.model.registry import BASELINE
 
@@ -54,8 +54,8 @@ class Calibration:
 
 CALIBRATION = Calibration()
 NONE, UNKNOWN = (), ("unknown",)
-LARGE_MISFIT = 3
-"""Index in ``MISFIT_LEVELS`` from which on a misfit is larger than the noise."""
+LARGE_MISFIT = 3.0
+"""Misfit, in noise standard deviations, from which on something counts as unexplained in part."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +123,11 @@ def _slow(evidences, c, hot):
         more -= c.slack * (most if effects == NONE else gain[effects])
         weight = c.unknown if effects == NONE else c.remainder * share(effects)
         strange.append(np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot))
+    large = np.array(MISFIT_LEVELS) >= LARGE_MISFIT
     for effects, values in evidences.slow.items():
         # Where a hypothesis needs a misfit well beyond the noise, something is left that it does not explain.
-        large = logsumexp((values + misfit)[LARGE_MISFIT:]) - value[NONE] - c.slack * gain[effects]
-        strange.append(np.log(c.remainder * share(effects)) + large / temperature)
+        rest = logsumexp((values + misfit)[large]) - value[NONE] - c.slack * gain[effects]
+        strange.append(np.log(c.remainder * share(effects)) + rest / temperature)
     score[UNKNOWN] = logsumexp(strange)
     return _normalised(score)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag, cholesky, solve_triangular
@@ -75,14 +76,19 @@ class Setting:
         return Whitening.of(self.covariance(*terms), self.places.record)
 
     def covariance(self, *terms) -> np.ndarray:
-        """Noise, steps that come early or late, sharp misfit and more, (blocks, blocks).
+        """What every hypothesis has in common, and more, (blocks, blocks).
 
         ``terms`` are (kernel name, length, standard deviation in noise units) each.
         """
-        covariance = self.noise + self.places.early_steps() + self.noise_rad**2 * self.kernel("sharp", MISFIT_LENGTH)
+        covariance = self.common.copy()
         for name, length, deviation in terms:
             covariance += (deviation * self.noise_rad) ** 2 * self.kernel(name, length)
         return covariance
+
+    @cached_property
+    def common(self) -> np.ndarray:
+        """Covariance (blocks, blocks) of noise, torque ripple and sharp misfit [rad²]."""
+        return self.noise + self.places.torque_ripple() + self.noise_rad**2 * self.kernel("sharp", MISFIT_LENGTH)
 
     def kernel(self, name: str, length: float) -> np.ndarray:
         """Unit-variance covariance of the given kind (a method of ``Places``)."""

@@ -14,8 +14,8 @@ def relax(signal, time_s, constant_s, start):
     """
     samples = np.shape(time_s)[0]
     shape = np.broadcast_shapes(np.shape(signal)[:-1], np.shape(constant_s)[:-1], np.shape(start)[:-1])
-    signal = np.broadcast_to(signal, (*shape, samples)).reshape(-1, samples).astype(float, copy=False)
-    constant, start = (np.broadcast_to(v, (*shape, 1)).reshape(-1).astype(float) for v in (constant_s, start))
+    signal = np.ascontiguousarray(np.broadcast_to(signal, (*shape, samples)), float).reshape(-1, samples)
+    constant, start = (np.ascontiguousarray(np.broadcast_to(v, (*shape, 1)), float).ravel() for v in (constant_s, start))
     out = np.empty(signal.shape)
-    relaxed(np.ascontiguousarray(signal), np.diff(time_s), constant, start, out)
+    relaxed(signal, np.diff(time_s), constant, start, out)
     return out.reshape(*shape, samples)
