@@ -11,10 +11,13 @@ from scipy.linalg import cholesky, solve_triangular
 
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
+from backdrive_bayes.model.registry import MEMBERS
 
 FORMULA_ERRORS = (0.03, 0.15, 0.6)
 """Standard deviations by which an effect's contribution may differ from its formula, relative to the contribution."""
 FORMULA_LENGTH = 0.06
+DRIFT_LENGTH = 0.15
+"""Correlation length of the error of a formula for the time, in records."""
 
 
 def log_evidence(setting: Setting, fitted: Fitted, *terms) -> np.ndarray:
@@ -44,8 +47,17 @@ def _gaussian(setting, fitted, covariance):
 
 
 def formula_error(setting: Setting, fitted: Fitted) -> np.ndarray:
-    """Covariance (blocks, blocks) of the error of the effects' formulas, relative to their contributions."""
-    return sum(np.outer(change, change) for change in fitted.contributions) * setting.kernel("shape", FORMULA_LENGTH)
+    """Covariance (blocks, blocks) of the error of the effects' formulas, relative to their contributions.
+
+    It varies with the place on the loop, for an effect of the time alone with the time.
+    """
+    total = 0.0
+    for name, change in zip(fitted.effects, fitted.contributions, strict=True):
+        if getattr(MEMBERS[name], "of_time", False):
+            total = total + np.mean(change**2) * setting.kernel("time_smooth", DRIFT_LENGTH)
+        else:
+            total = total + np.outer(change, change) * setting.kernel("shape", FORMULA_LENGTH)
+    return total
 
 
 def _integrated(fitted, residual, jacobian):

@@ -86,6 +86,7 @@ def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, r
     z[:, ~own] = known.z[order]
     z[:, own] = rng.standard_normal((draws, own.sum()))
     flexible = Flexible.of(known, whitening)
+    _put_guesses(setting, known, effect, z, problem, flexible, whitening)
     change = flexible.left((known.residual - problem.raw_residual(z)) @ whitening.matrix.T)
     size = np.einsum("ij,ij->i", change, change) + 1.0
     amount = change @ flexible.residual / size
@@ -94,6 +95,27 @@ def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, r
     starts = z[best]
     _scale_amplitude(problem, own, starts, amount[best])
     return Screen(problem, starts, amount[best][:, None] * change[best])
+
+
+def _put_guesses(setting, known, effect, z, problem, flexible, whitening):
+    """Overwrite the first draws, in place, with the points that the effect itself takes for promising."""
+    guesses = getattr(members_named([effect])[0], "guesses", None)
+    if guesses is None:
+        return
+    measured = np.concatenate([data.blocks.angle_rad for data in setting.problem.records])
+
+    def taken_out(columns):
+        white = flexible.left(columns @ whitening.matrix.T)
+        gram, load = np.einsum("sib,sjb->sij", white, white), white @ flexible.residual
+        found = np.linalg.solve(gram + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[-1]), load[..., None])
+        return found[..., 0], np.einsum("si,si->s", found[..., 0], load)
+
+    for row, guess in zip(z, guesses(measured - known.residual, setting.places.record, taken_out), strict=False):
+        for i, coordinate in enumerate(problem.coordinates):
+            name, record = coordinate.parameter.name, coordinate.record
+            if name in guess:
+                value = guess[name] if record is None else guess[name][record]
+                row[i] = np.clip(coordinate.parameter.scaled_prior(problem.model.scale).to_normal(value), -3, 3)
 
 
 @dataclass(frozen=True, eq=False)

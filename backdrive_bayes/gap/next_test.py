@@ -64,7 +64,7 @@ def _swap_separation(setting, pair, whitening):
 
 def _in_channel(fitted):
     stages = {m.name: m.stage for m in fitted.problem.model.members}
-    return any(stages[name] in (Stage.TORQUE_CHANNEL, Stage.ANGLE_CHANNEL) for name in fitted.effects)
+    return any(stages[name].channel for name in fitted.effects)
 
 
 def _drop(separation, probability):

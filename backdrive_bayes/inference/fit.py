@@ -15,12 +15,11 @@ from backdrive_bayes.inference.diagnostics import Convergence, Outcome, diagnose
 from backdrive_bayes.inference.discrepancy import Discrepancy, learn_discrepancy
 from backdrive_bayes.inference.noise_refinement import refine_noise
 from backdrive_bayes.inference.optimum import Optimum, find_optimum
-from backdrive_bayes.inference.problem import Problem, RecordData
+from backdrive_bayes.inference.problem import Problem, RecordData, path_within
 from backdrive_bayes.inference.sampling import Ensembles, Settings, begin_ensembles, run_ensembles, warm_up
 from backdrive_bayes.inference.starts import along_ridges, feature_starts, scattered, screened_starts, with_other_pasts
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import Scale
-from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
 from backdrive_bayes.model.registry import BASELINE, members_named
 from backdrive_bayes.records.branches import find_segments
@@ -149,14 +148,8 @@ def corrected_blocks(problem: Problem, z, record: int, path_sd: float = 0.0):
     """
     data = problem.records[record]
     blocks, path = data.blocks, data.path
-    ends = blocks.edges_nm()
-    share = (np.arange(NODES) + 0.5) / NODES
-    torque = ends[0][:, None] + (ends[1] - ends[0])[:, None] * share
-    torque += (blocks.torque_nm - torque.mean(axis=1))[:, None]
-    legs = tuple(replace(leg, start=leg.start * NODES, stop=leg.stop * NODES) for leg in path.legs)
     values = problem.values(z, record)
-    time = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
-    fine = problem.model.angle(values, TorquePath(torque.ravel(), time.ravel(), path.start_torque_nm, legs))
+    fine = problem.model.angle(values, path_within(blocks, path, NODES))
     bend = fine.reshape(-1, NODES).mean(axis=1) - problem.model.angle(values, path)
     return replace(
         blocks,

@@ -25,11 +25,13 @@ class Stage(enum.IntEnum):
     """Adds output angle [rad]."""
     ANGLE_CHANNEL = 5
     """Adds to the angle that is read [rad] what is no motion of the reducer."""
+    FAST_ANGLE_CHANNEL = 6
+    """The same, changing within a sample that is a mean over a block: followed at nodes within the blocks and averaged."""
 
     @property
     def channel(self) -> bool:
         """Whether the member is a fault of the bench's sensors and no part of the reducer."""
-        return self in (Stage.TORQUE_CHANNEL, Stage.ANGLE_CHANNEL)
+        return self in (Stage.TORQUE_CHANNEL, Stage.ANGLE_CHANNEL, Stage.FAST_ANGLE_CHANNEL)
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,13 @@ class Member(Protocol):
 
     ``respond(values, drive)`` takes a mapping from parameter names to arrays of shape (…, 1) and returns what its stage says,
     shape (…, samples) unless said otherwise. ``signature`` is what the member is known by, one phrase.
+
+    ``of_time`` (absent: False) tells that it depends on the time alone, so that its formula errs as a function of the time.
+    A member whose parameters are hard to hit by chance may also have a method ``guesses(angle_rad, record, taken_out)``: points
+    worth starting a search from, a list of mappings from parameter names to values, of shape (records,) where a record has its
+    own. It is given the angle without the member and the number of the record, shape (blocks,) each, and a function that
+    returns the least-squares amplitudes (sets, columns) of sets of columns (sets, columns, blocks) in what is unexplained, and
+    the chi-square that each set takes out (sets,).
     """
 
     name: str

@@ -23,13 +23,15 @@ class TorquePath:
     """A torque history: ``torque_nm`` and ``time_s`` of shape (samples,), the torque it starts from, and its legs.
 
     The legs are contiguous, cover all samples and alternate in direction; inside a leg the samples lie between the
-    turning torques at its two ends. Turning points need not be samples.
+    turning torques at its two ends. Turning points need not be samples. Where samples are means over blocks, ``within`` is the
+    same path at an equal number of nodes within each block.
     """
 
     torque_nm: np.ndarray
     time_s: np.ndarray
     start_torque_nm: float
     legs: tuple[Leg, ...]
+    within: TorquePath | None = None
 
     @functools.cached_property
     def direction(self) -> np.ndarray:

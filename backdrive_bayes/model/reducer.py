@@ -65,8 +65,6 @@ class ReducerModel:
         """
         drive = self._transmit(values, self._at_the_output(values, path))
         angle = self._comply(values, drive)
-        if not self._at(Stage.ANGLE_CHANNEL):
-            return angle
         return self._read(values, replace(drive, angle_rad=angle))[0]
 
     def _at_the_output(self, values, path):
@@ -94,8 +92,20 @@ class ReducerModel:
 
     def _read(self, values, drive):
         """The angle that is read, and what each member of the angle channel adds to it."""
+        angle, parts = self._added(values, drive, Stage.ANGLE_CHANNEL)
+        within = drive.path.within
+        if within is None or not self._at(Stage.FAST_ANGLE_CHANNEL):
+            angle, fast = self._added(values, replace(drive, angle_rad=angle), Stage.FAST_ANGLE_CHANNEL)
+            return angle, parts | fast
+        slow = replace(self, members=tuple(m for m in self.members if m.stage is not Stage.FAST_ANGLE_CHANNEL))
+        nodes = replace(drive, path=within, angle_rad=slow.angle(values, within))
+        fast = self._added(values, nodes, Stage.FAST_ANGLE_CHANNEL)[1]
+        fast = {name: part.reshape(*part.shape[:-1], drive.path.torque_nm.size, -1).mean(axis=-1) for name, part in fast.items()}
+        return angle + sum(fast.values()), parts | fast
+
+    def _added(self, values, drive, stage):
         parts = {}
-        for member in self._at(Stage.ANGLE_CHANNEL):
+        for member in self._at(stage):
             parts[member.name] = member.respond(values, drive)
             drive = replace(drive, angle_rad=drive.angle_rad + parts[member.name])
         return drive.angle_rad, parts

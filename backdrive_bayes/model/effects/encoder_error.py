@@ -7,12 +7,16 @@ import numpy as np
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter, Uniform
 
+COUNTS = np.arange(4.5, 130.0, 0.25)
+"""Numbers of periods within the range of the angle that are looked through."""
+GUESSES = 3
+
 
 class EncoderError:
     """A sine of the angle itself and its second harmonic; the phase is a record's own, because the encoder's zero is."""
 
     name = "encoder_error"
-    stage = Stage.ANGLE_CHANNEL
+    stage = Stage.FAST_ANGLE_CHANNEL
     signature = "periodic in the angle that is measured"
     source = "interpolation error of sine-cosine encoders"
     parameters = (
@@ -29,3 +33,20 @@ class EncoderError:
         turn = 2 * np.pi * (drive.angle_rad / values["encoder_period"] + values["encoder_phase"])
         second = np.sin(2 * turn + 2 * np.pi * values["encoder_harmonic_phase"])
         return values["encoder_amplitude"] * (np.sin(turn) + values["encoder_harmonic"] * second)
+
+    def guesses(self, angle_rad, record, taken_out):
+        """The periods whose sine and cosine, each record with amplitudes of its own, take most out of what is unexplained."""
+        periods = np.ptp(angle_rad) / COUNTS
+        turn = 2 * np.pi * angle_rad / periods[:, None]
+        own = (np.arange(record.max() + 1)[:, None] == record)[None, :, None, :]
+        columns = own * np.stack([np.sin(turn), np.cos(turn)], axis=1)[:, None]
+        found, gain = taken_out(columns.reshape(periods.size, -1, angle_rad.size))
+        found = found.reshape(periods.size, -1, 2)
+        peaks = [i for i in np.argsort(-gain) if gain[i] == gain[max(i - 4, 0) : i + 5].max()][:GUESSES]
+        return [
+            {
+                "encoder_period": periods[i], "encoder_amplitude": np.sqrt(np.mean(np.sum(found[i] ** 2, axis=-1))),
+                "encoder_harmonic": 0.05, "encoder_phase": np.arctan2(found[i, :, 1], found[i, :, 0]) / (2 * np.pi) % 1.0,
+            }
+            for i in peaks
+        ]  # fmt: skip

@@ -13,7 +13,7 @@ class SensorLag:
     """The angle that is read is late by ``lag_time``: a share of it as a first-order low-pass, the rest as a pure delay."""
 
     name = "sensor_lag"
-    stage = Stage.ANGLE_CHANNEL
+    stage = Stage.FAST_ANGLE_CHANNEL
     signature = "the loop grows wider with rate times slope"
     source = "filters and buses of encoders and torque amplifiers"
     parameters = (

@@ -20,6 +20,7 @@ class ThermalDrift:
 
     name = "thermal_drift"
     stage = Stage.ANGLE_CHANNEL
+    of_time = True
     signature = "depends on time and not on torque: the loop does not close, record by record"
     source = "warm-up of encoders, mounts and housings"
     parameters = tuple(Parameter(name, "rad", "angle", Normal(sd), 0.0, WARM_UP, True) for name, sd in TERMS.items())
