@@ -46,12 +46,18 @@ class Friction:
         """Transmitted torque [N·m] of shape (…, samples)."""
         factor, start = drive.friction_factor, values["initial_friction_state"]
         level, ratio = factor * values["friction_torque"] / drive.rated_torque_nm, factor * values["friction_ratio"]
-        shared = (level, ratio, values["friction_spread"], values["load_spread"], values["free_share"])
-        weights = _weights(*((np.shape(v), np.asarray(v, float).tobytes()) for v in shared))
+        given = (level, ratio, values["friction_spread"], values["load_spread"], values["free_share"], start, drive.shift_nm)
+        given = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given))
+        # Most of the points of a numerical derivative have their friction in common.
+        apart, which = np.unique(np.concatenate(given, axis=-1).reshape(-1, len(given)), axis=0, return_inverse=True)
+        *shared, start, shift = (np.ascontiguousarray(column) for column in np.split(apart, len(given), axis=1))
+        weights = _weights(*((v.shape, v.tobytes()) for v in shared))
         past = np.concatenate([weights * np.maximum(start, 0), weights * np.maximum(-start, 0)], axis=-1)
-        if np.ndim(drive.shift_nm) == 0:
-            return _bank(drive.path, drive.rated_torque_nm, 0).passed(weights, past)
-        return _passed_shifted(drive, weights, past)
+        if np.any(shift):
+            passed = _passed_shifted(drive, weights, past, shift)
+        else:
+            passed = _bank(drive.path, drive.rated_torque_nm, 0).passed(weights, past)
+        return passed[which.ravel()].reshape(*given[0].shape[:-1], -1)
 
 
 @functools.lru_cache(maxsize=8)
@@ -67,13 +73,9 @@ def _weights(*shared: tuple[tuple[int, ...], bytes]) -> np.ndarray:
     return weights
 
 
-def _passed_shifted(drive, weights, past):
-    """Transmitted torque with the torque reading in error, between the banks of the two nearest shifts."""
-    shape = np.broadcast_shapes(weights.shape[:-1], np.shape(drive.shift_nm)[:-1])
-    weights, past, place = (
-        np.broadcast_to(x, (*shape, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1])
-        for x in (weights, past, drive.shift_nm / (SHIFT_STEP * drive.rated_torque_nm))
-    )
+def _passed_shifted(drive, weights, past, shift_nm):
+    """Transmitted torque (points, samples) with the torque reading in error, between the banks of the two nearest shifts."""
+    place = shift_nm / (SHIFT_STEP * drive.rated_torque_nm)
     passed = np.zeros((place.size, drive.path.torque_nm.size))
     for node in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
         hat = np.maximum(1 - np.abs(place - node), 0)
@@ -81,7 +83,7 @@ def _passed_shifted(drive, weights, past):
         if own.any():
             bank = _bank(drive.path, drive.rated_torque_nm, node)
             passed[own] += bank.passed((hat * weights)[own], (hat * past)[own])
-    return passed.reshape(*shape, -1)
+    return passed
 
 
 class _Bank:

@@ -24,7 +24,7 @@ class TorquePath:
 
     The legs are contiguous, cover all samples and alternate in direction; inside a leg the samples lie between the
     turning torques at its two ends. Turning points need not be samples. Where samples are means over blocks, ``within`` is the
-    same path at an equal number of nodes within each block.
+    same path at an odd number of nodes within each block, the middle one being the sample.
     """
 
     torque_nm: np.ndarray

@@ -56,16 +56,19 @@ class ReducerModel:
             after = self._comply(values, drive)
             parts[member.name] = after - before
             before = after
-        return parts | self._read(values, replace(drive, angle_rad=before))[1]
+        parts |= self._read(values, replace(drive, angle_rad=before))[1]
+        return parts | self._read_within(values, path)[1] if self._averaged(path) else parts
 
     def angle(self, values, path: TorquePath) -> np.ndarray:
         """Output angle [rad] without the encoder's offset, shape (…, samples).
 
         ``values`` maps every parameter's name to an array of shape (…, 1) in SI units.
         """
+        if self._averaged(path):
+            before, fast = self._read_within(values, path)
+            return before + sum(fast.values())
         drive = self._transmit(values, self._at_the_output(values, path))
-        angle = self._comply(values, drive)
-        return self._read(values, replace(drive, angle_rad=angle))[0]
+        return self._read(values, replace(drive, angle_rad=self._comply(values, drive)))[0]
 
     def _at_the_output(self, values, path):
         drive = Drive(path, self.scale.torque_nm)
@@ -92,23 +95,25 @@ class ReducerModel:
 
     def _read(self, values, drive):
         """The angle that is read, and what each member of the angle channel adds to it."""
-        angle, parts = self._added(values, drive, Stage.ANGLE_CHANNEL)
-        within = drive.path.within
-        if within is None or not self._at(Stage.FAST_ANGLE_CHANNEL):
-            angle, fast = self._added(values, replace(drive, angle_rad=angle), Stage.FAST_ANGLE_CHANNEL)
-            return angle, parts | fast
-        slow = replace(self, members=tuple(m for m in self.members if m.stage is not Stage.FAST_ANGLE_CHANNEL))
-        nodes = replace(drive, path=within, angle_rad=slow.angle(values, within))
-        fast = self._added(values, nodes, Stage.FAST_ANGLE_CHANNEL)[1]
-        fast = {name: part.reshape(*part.shape[:-1], drive.path.torque_nm.size, -1).mean(axis=-1) for name, part in fast.items()}
-        return angle + sum(fast.values()), parts | fast
-
-    def _added(self, values, drive, stage):
         parts = {}
-        for member in self._at(stage):
+        for member in (*self._at(Stage.ANGLE_CHANNEL), *self._at(Stage.FAST_ANGLE_CHANNEL)):
             parts[member.name] = member.respond(values, drive)
             drive = replace(drive, angle_rad=drive.angle_rad + parts[member.name])
         return drive.angle_rad, parts
+
+    def _read_within(self, values, path):
+        """The angle before the fast angle channel, and what each member of that adds to the means over blocks."""
+        fast = self._at(Stage.FAST_ANGLE_CHANNEL)
+        before = replace(self, members=tuple(m for m in self.members if m not in fast)).angle(values, path.within)
+        drive = Drive(path.within, self.scale.torque_nm, angle_rad=before)
+        parts = replace(self, members=tuple(fast))._read(values, drive)[1]
+        blocks = path.torque_nm.size
+        nodes = path.within.torque_nm.size // blocks
+        means = {name: part.reshape(*part.shape[:-1], blocks, nodes).mean(axis=-1) for name, part in parts.items()}
+        return before[..., nodes // 2 :: nodes], means
+
+    def _averaged(self, path):
+        return path.within is not None and bool(self._at(Stage.FAST_ANGLE_CHANNEL))
 
     def _at(self, stage: Stage):
         return [m for m in self.members if m.stage is stage]
