@@ -135,7 +135,7 @@ GRID = {
     "misfit": tuple(falling(r, len(MISFIT_LEVELS)) for r in (0.3, 0.7, 1.5)),
     "unknown_level": tuple(falling(r, len(UNKNOWN_LEVELS)) for r in (-1.0, 0.0, 1.0)),
     "pair": (0.002, 0.005, 0.01, 0.02, 0.03), "none": (0.3, 0.4, 0.5, 0.6), "fast_temperature": (5.0, 8.0, 12.0),
-    "fast": (0.05, 0.1, 0.2), "imprint": (2.0, 3.4),
+    "fast": (0.05, 0.1, 0.2), "imprint": (2.0, 3.4), "beside": (0.1, 0.3, 1.0),
 }  # fmt: skip
 """Values that are tried, one entry of the calibration after another."""
 

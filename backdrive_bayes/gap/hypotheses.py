@@ -107,8 +107,9 @@ def _put_guesses(setting, known, effect, z, problem, flexible, whitening):
     def taken_out(columns):
         white = flexible.left(columns @ whitening.matrix.T)
         gram, load = np.einsum("sib,sjb->sij", white, white), white @ flexible.residual
-        found = np.linalg.solve(gram + 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[-1]), load[..., None])
-        return found[..., 0], np.einsum("si,si->s", found[..., 0], load)
+        ridge = 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[-1])
+        found = np.linalg.solve(gram + ridge, load[..., None])[..., 0]
+        return found, np.einsum("si,si->s", found, load)
 
     for row, guess in zip(z, guesses(measured - known.residual, setting.places.record, taken_out), strict=False):
         for i, coordinate in enumerate(problem.coordinates):

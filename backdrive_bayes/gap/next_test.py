@@ -8,7 +8,6 @@ from backdrive_bayes.gap.draws import laplace_draws
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting, Whitening
 from backdrive_bayes.inference.discrepancy import amplitude_nm
-from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.path import TorquePath
 
 POINTS = 80

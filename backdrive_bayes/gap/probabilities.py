@@ -28,9 +28,10 @@ class Calibration:
     unexplained structure beside a hypothesis. From what is unexplained ``slack`` is taken off, the share of what
     effects explain that counts as their formulas' error. ``unknown`` is the weight of something else and no effect,
     ``remainder`` of something else beside an effect, relative to that effect. ``imprint`` multiplies the temperature of slow
-    evidences beside stick-slip, whose jumps leave traces in wide blocks that no slow model explains; ``triple`` is the share
-    left to three effects at once, or to fast structure with something unknown beside it. ``module`` are the odds of a
-    module that every reducer has and the baseline was asked to do without, whatever else there is.
+    evidences beside stick-slip, whose jumps leave traces in wide blocks that no slow model explains; ``beside`` is the share
+    left to an effect beside fast structure, for two effects are rarer than the two of them apart would be, ``triple`` that left
+    to three effects at once, or to fast structure with something unknown beside it. ``module`` are the odds of a module that
+    every reducer has and the baseline was asked to do without, whatever else there is.
     """
 
     cool: float = 3.5
@@ -44,6 +45,7 @@ class Calibration:
     remainder: float = 1.0
     fast: float = 0.05
     imprint: float = 3.4
+    beside: float = 0.3
     triple: float = 0.02
     module: float = 20.0
     slack: float = 0.1
@@ -96,11 +98,17 @@ def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) 
     for name, q in quick.items():
         for effects, p in slow[calibration.imprint if name == STICK_SLIP else 1.0].items():
             both = _union(effects, name)
-            more = sum(name not in BASELINE for name in both) > 2 or (effects == UNKNOWN and name not in (None, VIBRATION))
-            share = calibration.triple if more else 1.0
-            joint[both] = joint.get(both, 0.0) + p * q * share
+            joint[both] = joint.get(both, 0.0) + p * q * _share_beside(effects, name, both, calibration)
     total = sum(joint.values())
     return {effects: p / total for effects, p in joint.items()}
+
+
+def _share_beside(effects, fast, both, c):
+    """Prior share of slow ``effects`` beside fast structure, ``both`` together being what is answered."""
+    number = sum(name not in BASELINE for name in both)
+    if number > 2 or (effects == UNKNOWN and fast not in (None, VIBRATION)):
+        return c.triple
+    return c.beside if both != effects and number == 2 else 1.0
 
 
 def _union(effects, fast):

@@ -56,8 +56,9 @@ class ReducerModel:
             after = self._comply(values, drive)
             parts[member.name] = after - before
             before = after
-        parts |= self._read(values, replace(drive, angle_rad=before))[1]
-        return parts | self._read_within(values, path)[1] if self._averaged(path) else parts
+        if self._averaged(path):
+            return parts | self._read_within(values, path)[1]
+        return parts | self._read(values, replace(drive, angle_rad=before))[1]
 
     def angle(self, values, path: TorquePath) -> np.ndarray:
         """Output angle [rad] without the encoder's offset, shape (…, samples).
@@ -65,8 +66,8 @@ class ReducerModel:
         ``values`` maps every parameter's name to an array of shape (…, 1) in SI units.
         """
         if self._averaged(path):
-            before, fast = self._read_within(values, path)
-            return before + sum(fast.values())
+            before, channel = self._read_within(values, path)
+            return before + sum(channel.values())
         drive = self._transmit(values, self._at_the_output(values, path))
         return self._read(values, replace(drive, angle_rad=self._comply(values, drive)))[0]
 
@@ -102,15 +103,17 @@ class ReducerModel:
         return drive.angle_rad, parts
 
     def _read_within(self, values, path):
-        """The angle before the fast angle channel, and what each member of that adds to the means over blocks."""
-        fast = self._at(Stage.FAST_ANGLE_CHANNEL)
-        before = replace(self, members=tuple(m for m in self.members if m not in fast)).angle(values, path.within)
-        drive = Drive(path.within, self.scale.torque_nm, angle_rad=before)
-        parts = replace(self, members=tuple(fast))._read(values, drive)[1]
+        """The angle before the angle channel, and what each member of that adds, fast ones to the means over blocks."""
+        slow = [m.name for m in self._at(Stage.ANGLE_CHANNEL)]
+        channel = (*slow, *(m.name for m in self._at(Stage.FAST_ANGLE_CHANNEL)))
+        before = replace(self, members=tuple(m for m in self.members if m.name not in channel)).angle(values, path.within)
+        parts = self._read(values, Drive(path.within, self.scale.torque_nm, angle_rad=before))[1]
         blocks = path.torque_nm.size
-        nodes = path.within.torque_nm.size // blocks
-        means = {name: part.reshape(*part.shape[:-1], blocks, nodes).mean(axis=-1) for name, part in parts.items()}
-        return before[..., nodes // 2 :: nodes], means
+        before, *parts = (a.reshape(*a.shape[:-1], blocks, -1) for a in (before, *(parts[name] for name in channel)))
+        middle = before.shape[-1] // 2
+        return before[..., middle], {
+            name: part[..., middle] if name in slow else part.mean(axis=-1) for name, part in zip(channel, parts, strict=True)
+        }
 
     def _averaged(self, path):
         return path.within is not None and bool(self._at(Stage.FAST_ANGLE_CHANNEL))

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from backdrive_bayes.gap.evidence import log_evidence
+from backdrive_bayes.gap.evidence import formula_error, log_evidence
 
 N, RECORDS = 30, np.repeat([0, 1], 15)
 
@@ -69,6 +69,18 @@ def test_formula_error_lowers_the_evidence_of_what_needs_no_error():
     for seed in range(40):
         exact = hypothesis(seed)
         exact.residual *= setting.noise_sd
-        loose = SimpleNamespace(**{**vars(exact), "contributions": (np.linspace(-20, 20, N),)})
+        loose = with_contribution(exact, "interface_slip", np.linspace(-20, 20, N))
         gain.append(log_evidence(setting, exact) - log_evidence(setting, loose))
     assert np.all(np.mean(gain, axis=0) > 3 * np.std(gain, axis=0) / np.sqrt(len(gain)))
+
+
+def with_contribution(fitted, effect, change):
+    return SimpleNamespace(**{**vars(fitted), "effects": (effect,), "contributions": (change,)})
+
+
+def test_the_formula_of_a_drift_errs_with_the_time_also_where_the_drift_is_nought():
+    change = np.linspace(-20, 20, N)
+    fitted = [with_contribution(hypothesis(), effect, change) for effect in ("thermal_drift", "interface_slip")]
+    drift, slip = (formula_error(LinearSetting(), f) for f in fitted)
+    np.testing.assert_allclose(np.diag(drift), np.mean(change**2))
+    np.testing.assert_allclose(np.diag(slip), change**2)

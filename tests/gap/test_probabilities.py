@@ -1,6 +1,7 @@
 """From evidences to probabilities and credible sets."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -74,6 +75,14 @@ def test_fast_structure_joins_the_slow_answer_and_vibration_is_unknown():
     assert labels(candidates(sensor_lag=100.0), jumps)["sensor_lag+stick_slip"] > 0.5
     hum = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": 80.0}, {})
     assert labels(candidates(sensor_lag=100.0), hum)["unknown"] > 0.9
+
+
+def test_two_effects_are_rarer_than_one_also_where_one_is_fast():
+    jumps = Fast({"encoder_error": -3.0, "stick_slip": 200.0, "vibration": -3.0}, {})
+    found = Evidences.of(candidates(sensor_lag=-2.0, thermal_drift=-2.0, interface_slip=-2.0), jumps)
+    chosen = [replace(CALIBRATION, beside=share) for share in (0.3, 1.0)]
+    alone, loose = (marginal(probabilities(found, c))["stick_slip"] for c in chosen)
+    assert alone > 0.8 and loose < alone - 0.05
 
 
 def test_credible_set_is_the_smallest_that_holds_the_level():
