@@ -2,9 +2,9 @@
 
     python studies/real_gaps.py --data ../shared/data/cycloidal --workers 2 --out reports/real-gaps
 
-Geometric error is withheld, then friction: the answer must hold it. With the whole baseline nobody knows the answer. Written:
-real_gaps.json, one entry a unit and baseline as it is found. Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator,
-Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
+Geometric error is withheld, then friction: the answer should hold it. With the whole baseline nobody knows the answer. Written:
+real_gaps.json, one entry a unit and baseline as it is found, and how often what was withheld was named. Data:
+github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
 """
 
 from __future__ import annotations
@@ -38,10 +38,21 @@ def study(job) -> dict:
         "unit": unit.name, "withheld": withheld, "inconclusive": found["inconclusive"], "answer": found["answer"]["effects"],
         "set_90": found["answer"]["credible_set_90"],
         "probabilities": {row["effect"]: round(row["probability"], 4) for row in found["which"][:5]},
+        "probability_of_withheld": sum(r["probability"] for r in found["which"] if withheld in r["effect"].split("+")),
         "where": found["where"]["summary"], "closed_fraction": shrink["closed_fraction"],
         "control": shrink["gaussian_process"]["closed_fraction"],
         **{key: shrink[key] for key in ("before_rad", "after_rad", "noise_floor_rad")}, "seconds": round(found["seconds"], 1),
     }  # fmt: skip
+
+
+def named(found, withheld) -> dict:
+    """Of the units without a module, how many answers hold it, how many do not, how many gave no verdict."""
+    asked = [r for r in found if r["withheld"] == withheld]
+    told = [r for r in asked if not r["inconclusive"]]
+    right = sum(withheld in r["answer"] for r in told)
+    inside = sum(any(withheld in label.split("+") for label in r["set_90"]) for r in told)
+    return {"withheld": withheld, "units": len(asked), "right": right, "wrong": len(told) - right, "in_the_set": inside,
+            "inconclusive": len(asked) - len(told)}  # fmt: skip
 
 
 def main():
@@ -57,11 +68,11 @@ def main():
     with ProcessPoolExecutor(options.workers) as pool:
         for result in pool.map(study, [(folder, withheld) for withheld in WITHHELD for folder in folders]):
             found.append(result)
-            (options.out / "real_gaps.json").write_text(json.dumps({"credit": CREDIT, "diagnoses": found}, indent=1))
+            kept = {"credit": CREDIT, "named": [named(found, module) for module in WITHHELD[:-1]], "diagnoses": found}
+            (options.out / "real_gaps.json").write_text(json.dumps(kept, indent=1))
             print(*(result[k] for k in ("unit", "withheld", "answer", "probabilities", "where", "seconds")), flush=True)
-    for withheld in WITHHELD[:-1]:
-        asked = [r for r in found if r["withheld"] == withheld]
-        print(f"{withheld} withheld: named in {sum(withheld in r['answer'] for r in asked)} of {len(asked)}")
+    for counts in kept["named"]:
+        print(counts)
 
 
 if __name__ == "__main__":

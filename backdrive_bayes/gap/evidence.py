@@ -11,7 +11,6 @@ from scipy.linalg import cholesky, solve_triangular
 
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
-from backdrive_bayes.model.registry import MEMBERS
 
 FORMULA_ERRORS = (0.03, 0.15, 0.6)
 """Standard deviations by which an effect's contribution may differ from its formula, relative to the contribution."""
@@ -49,14 +48,15 @@ def _gaussian(setting, fitted, covariance):
 def formula_error(setting: Setting, fitted: Fitted) -> np.ndarray:
     """Covariance (blocks, blocks) of the error of the effects' formulas, relative to their contributions.
 
-    It varies with the place on the loop, for an effect of the time alone with the time.
+    It varies with the place on the loop, for an effect of the time alone with the time, as large as the effect in each record.
     """
-    total = 0.0
+    record, total = setting.places.record, 0.0
+    of_time = {m.name for m in fitted.problem.model.members if getattr(m, "of_time", False)}
     for name, change in zip(fitted.effects, fitted.contributions, strict=True):
-        if getattr(MEMBERS[name], "of_time", False):
-            total = total + np.mean(change**2) * setting.kernel("time_smooth", DRIFT_LENGTH)
-        else:
-            total = total + np.outer(change, change) * setting.kernel("shape", FORMULA_LENGTH)
+        if name in of_time:
+            change = np.sqrt(np.bincount(record, change**2) / np.bincount(record))[record]
+        kernel = ("time_alone", DRIFT_LENGTH) if name in of_time else ("shape", FORMULA_LENGTH)
+        total = total + np.outer(change, change) * setting.kernel(*kernel)
     return total
 
 

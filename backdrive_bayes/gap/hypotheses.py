@@ -86,7 +86,8 @@ def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, r
     z[:, ~own] = known.z[order]
     z[:, own] = rng.standard_normal((draws, own.sum()))
     flexible = Flexible.of(known, whitening)
-    _put_guesses(setting, known, effect, z, problem, flexible, whitening)
+    for row, guess in zip(z, _guessed(problem, effect, known, flexible, whitening), strict=False):
+        _place(problem, row, guess)
     change = flexible.left((known.residual - problem.raw_residual(z)) @ whitening.matrix.T)
     size = np.einsum("ij,ij->i", change, change) + 1.0
     amount = change @ flexible.residual / size
@@ -97,12 +98,11 @@ def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, r
     return Screen(problem, starts, amount[best][:, None] * change[best])
 
 
-def _put_guesses(setting, known, effect, z, problem, flexible, whitening):
-    """Overwrite the first draws, in place, with the points that the effect itself takes for promising."""
-    guesses = getattr(members_named([effect])[0], "guesses", None)
-    if guesses is None:
-        return
-    measured = np.concatenate([data.blocks.angle_rad for data in setting.problem.records])
+def _guessed(problem, effect, known, flexible, whitening) -> list[dict]:
+    """The points that the effect itself takes for promising beside a known hypothesis, if it has an opinion."""
+    member = next(m for m in problem.model.members if m.name == effect)
+    if not hasattr(member, "guesses"):
+        return []
 
     def taken_out(columns):
         white = flexible.left(columns @ whitening.matrix.T)
@@ -111,12 +111,17 @@ def _put_guesses(setting, known, effect, z, problem, flexible, whitening):
         found = np.linalg.solve(gram + ridge, load[..., None])[..., 0]
         return found, np.einsum("si,si->s", found, load)
 
-    for row, guess in zip(z, guesses(measured - known.residual, setting.places.record, taken_out), strict=False):
-        for i, coordinate in enumerate(problem.coordinates):
-            name, record = coordinate.parameter.name, coordinate.record
-            if name in guess:
-                value = guess[name] if record is None else guess[name][record]
-                row[i] = np.clip(coordinate.parameter.scaled_prior(problem.model.scale).to_normal(value), -3, 3)
+    measured = np.concatenate([data.blocks.angle_rad for data in problem.records])
+    record = np.concatenate([np.full(data.blocks.count.size, r) for r, data in enumerate(problem.records)])
+    return member.guesses(measured - known.residual, record, taken_out)
+
+
+def _place(problem, z, guess):
+    """Overwrite coordinates ``z`` (dimension,) in place by the guessed values of parameters."""
+    for name, value in guess.items():
+        own = [i for i, c in enumerate(problem.coordinates) if c.parameter.name == name]
+        prior = problem.coordinates[own[0]].parameter.scaled_prior(problem.model.scale)
+        z[own] = np.clip(prior.to_normal(value), -3, 3)
 
 
 @dataclass(frozen=True, eq=False)

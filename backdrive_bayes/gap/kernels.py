@@ -81,10 +81,14 @@ class Places:
         apart = np.minimum(apart, 1 - apart)
         return self._scaled(self._same_record() * np.exp(-apart / length))
 
-    def time_smooth(self, length: float) -> np.ndarray:
-        """Smooth function of the time within each record (Matérn-3/2 of ``length`` records)."""
+    def time_alone(self, length: float) -> np.ndarray:
+        """Smooth function of the time within each record (Matérn-3/2 of ``length`` records), as large in small loops."""
         apart = np.sqrt(3) * np.abs(self.time[:, None] - self.time) / length
-        return self._scaled(self._same_record() * (1 + apart) * np.exp(-apart))
+        return self._same_record() * (1 + apart) * np.exp(-apart)
+
+    def time_smooth(self, length: float) -> np.ndarray:
+        """The same, as large as the loop."""
+        return self._scaled(self.time_alone(length))
 
     def time_rough(self, length: float) -> np.ndarray:
         """Rough function of the time within each record (Matérn-1/2), which may jump."""

@@ -91,7 +91,7 @@ class Setting:
         return self.noise + self.places.torque_ripple() + self.noise_rad**2 * self.kernel("sharp", MISFIT_LENGTH)
 
     def kernel(self, name: str, length: float) -> np.ndarray:
-        """Unit-variance covariance of the given kind (a method of ``Places``)."""
+        """Covariance of the given kind (a method of ``Places``), of unit variance in the widest record."""
         if (name, length) not in self._kept:
             self._kept[name, length] = getattr(self.places, name)(length)
         return self._kept[name, length]

@@ -28,7 +28,7 @@ from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import reduce_record
 
-NODES = 8
+BEND_NODES = 8
 """Points within a block at which the model's curvature is averaged."""
 MOST_BLOCKS = 1200
 """Blocks of all records together beyond which each record gets fewer."""
@@ -147,10 +147,11 @@ def corrected_blocks(problem: Problem, z, record: int, path_sd: float = 0.0):
     The likelihood compares a block's mean angle with the angle at its mean torque; on the shoulders of a cliff they differ.
     """
     data = problem.records[record]
-    blocks, path = data.blocks, data.path
-    values = problem.values(z, record)
-    fine = problem.model.angle(values, path_within(blocks, path, NODES))
-    bend = fine.reshape(-1, NODES).mean(axis=1) - problem.model.angle(values, path)
+    blocks, values = data.blocks, problem.values(z, record)
+    fine = path_within(blocks, data.path, BEND_NODES)
+    # On a rough path the mean torque of the nodes is not quite the block's.
+    mean = replace(data.path, torque_nm=fine.torque_nm.reshape(-1, BEND_NODES).mean(axis=1), within=None)
+    bend = problem.model.angle(values, fine).reshape(-1, BEND_NODES).mean(axis=1) - problem.model.angle(values, mean)
     return replace(
         blocks,
         angle_rad=blocks.angle_rad - (bend - blocks.bend_rad),

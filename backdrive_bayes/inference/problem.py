@@ -22,8 +22,8 @@ from backdrive_bayes.records.reduction import Blocks
 WALKERS_AT_ONCE = 128
 """Chunk of walkers whose intermediate arrays stay in the cache; found by measurement (studies/speed.py)."""
 
-NODES = 3
-"""Points within a block at which a fast angle channel is followed; with four the evidence of a lag grows by 1 %."""
+CHANNEL_NODES = 3
+"""Points within a block at which a fast angle channel is followed: an odd number, so that one of them is the block's own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,16 +63,18 @@ def path_of(blocks: Blocks) -> TorquePath:
         for a, b, d, t in zip(bounds[:-1], bounds[1:], blocks.direction, blocks.turning_nm[1:], strict=True)
     )
     path = TorquePath(blocks.torque_nm, blocks.mid_s, float(blocks.turning_nm[0]), legs)
-    return replace(path, within=path_within(blocks, path, NODES))
+    return replace(path, within=path_within(blocks, path, CHANNEL_NODES))
 
 
 def path_within(blocks: Blocks, path: TorquePath, nodes: int) -> TorquePath:
-    """The path of some blocks at ``nodes`` evenly spaced points within each, whose mean is the block's torque."""
+    """The path of some blocks at ``nodes`` evenly spaced points within each, straight between their middles."""
     share = (np.arange(nodes) + 0.5) / nodes
-    begin, end = blocks.edges_nm()
-    torque = begin[:, None] + (end - begin)[:, None] * share
-    torque += (blocks.torque_nm - torque.mean(axis=1))[:, None]
     time = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
+    torque = np.empty_like(time)
+    for k, leg in enumerate(path.legs):
+        own = slice(leg.start, leg.stop)
+        at = np.r_[blocks.begin_s[own][:1], blocks.mid_s[own], blocks.end_s[own][-1:]]
+        torque[own] = np.interp(time[own], at, np.r_[blocks.turning_nm[k], blocks.torque_nm[own], blocks.turning_nm[k + 1]])
     legs = tuple(replace(leg, start=leg.start * nodes, stop=leg.stop * nodes) for leg in path.legs)
     return TorquePath(torque.ravel(), time.ravel(), path.start_torque_nm, legs)
 

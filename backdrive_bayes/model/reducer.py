@@ -57,7 +57,7 @@ class ReducerModel:
             parts[member.name] = after - before
             before = after
         if self._averaged(path):
-            return parts | self._read_within(values, path)[1]
+            return parts | whole._read_within(values, path)[1]
         return parts | self._read(values, replace(drive, angle_rad=before))[1]
 
     def angle(self, values, path: TorquePath) -> np.ndarray:
@@ -96,27 +96,34 @@ class ReducerModel:
 
     def _read(self, values, drive):
         """The angle that is read, and what each member of the angle channel adds to it."""
-        parts = {}
-        for member in (*self._at(Stage.ANGLE_CHANNEL), *self._at(Stage.FAST_ANGLE_CHANNEL)):
-            parts[member.name] = member.respond(values, drive)
-            drive = replace(drive, angle_rad=drive.angle_rad + parts[member.name])
-        return drive.angle_rad, parts
+        parts = self._added(values, drive, (Stage.ANGLE_CHANNEL, Stage.FAST_ANGLE_CHANNEL))
+        return drive.angle_rad + sum(parts.values()), parts
 
     def _read_within(self, values, path):
         """The angle before the angle channel, and what each member of that adds, fast ones to the means over blocks."""
-        slow = [m.name for m in self._at(Stage.ANGLE_CHANNEL)]
-        channel = (*slow, *(m.name for m in self._at(Stage.FAST_ANGLE_CHANNEL)))
-        before = replace(self, members=tuple(m for m in self.members if m.name not in channel)).angle(values, path.within)
-        parts = self._read(values, Drive(path.within, self.scale.torque_nm, angle_rad=before))[1]
-        blocks = path.torque_nm.size
-        before, *parts = (a.reshape(*a.shape[:-1], blocks, -1) for a in (before, *(parts[name] for name in channel)))
-        middle = before.shape[-1] // 2
-        return before[..., middle], {
-            name: part[..., middle] if name in slow else part.mean(axis=-1) for name, part in zip(channel, parts, strict=True)
-        }
+        bare = replace(self, members=tuple(m for m in self.members if m.stage < Stage.ANGLE_CHANNEL))
+        nodes = Drive(path.within, self.scale.torque_nm, angle_rad=bare.angle(values, path.within))
+        before = _by_block(nodes.angle_rad, path)
+        before = before[..., before.shape[-1] // 2]
+        slow = self._added(values, Drive(path, self.scale.torque_nm, angle_rad=before), (Stage.ANGLE_CHANNEL,))
+        within = sum(self._added(values, nodes, (Stage.ANGLE_CHANNEL,)).values())
+        fast = self._added(values, replace(nodes, angle_rad=nodes.angle_rad + within), (Stage.FAST_ANGLE_CHANNEL,))
+        return before, slow | {name: _by_block(part, path).mean(axis=-1) for name, part in fast.items()}
+
+    def _added(self, values, drive, stages):
+        parts = {}
+        for member in (m for stage in stages for m in self._at(stage)):
+            parts[member.name] = member.respond(values, drive)
+            drive = replace(drive, angle_rad=drive.angle_rad + parts[member.name])
+        return parts
 
     def _averaged(self, path):
         return path.within is not None and bool(self._at(Stage.FAST_ANGLE_CHANNEL))
 
     def _at(self, stage: Stage):
         return [m for m in self.members if m.stage is stage]
+
+
+def _by_block(angle, path):
+    """Angles at the nodes within blocks, shape (…, blocks, nodes)."""
+    return angle.reshape(*angle.shape[:-1], path.torque_nm.size, -1)

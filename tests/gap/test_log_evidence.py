@@ -4,8 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 from scipy.stats import multivariate_normal
+from support.bench import unit_of
 
 from backdrive_bayes.gap.evidence import formula_error, log_evidence
+from backdrive_bayes.gap.setting import Setting
+from backdrive_bayes.model.registry import BASELINE, members_named
 
 N, RECORDS = 30, np.repeat([0, 1], 15)
 
@@ -75,12 +78,25 @@ def test_formula_error_lowers_the_evidence_of_what_needs_no_error():
 
 
 def with_contribution(fitted, effect, change):
-    return SimpleNamespace(**{**vars(fitted), "effects": (effect,), "contributions": (change,)})
+    problem = SimpleNamespace(**vars(fitted.problem), model=SimpleNamespace(members=members_named([effect])))
+    return SimpleNamespace(**{**vars(fitted), "effects": (effect,), "contributions": (change,), "problem": problem})
 
 
-def test_the_formula_of_a_drift_errs_with_the_time_also_where_the_drift_is_nought():
-    change = np.linspace(-20, 20, N)
-    fitted = [with_contribution(hypothesis(), effect, change) for effect in ("thermal_drift", "interface_slip")]
-    drift, slip = (formula_error(LinearSetting(), f) for f in fitted)
-    np.testing.assert_allclose(np.diag(drift), np.mean(change**2))
-    np.testing.assert_allclose(np.diag(slip), change**2)
+def test_the_formula_of_a_drift_errs_with_the_time_in_each_record_as_the_drift_there():
+    setting = Setting.of(unit_of(amplitudes=(0.1, 0.05)), np.random.default_rng(0), BASELINE)
+    places = setting.places
+    size = np.where(places.record == 0, 2.0, 0.5)
+    change = size * np.sign(np.sin(40.0 * places.time))
+    fitted = {}
+    for effect in ("thermal_drift", "interface_slip"):
+        fitted[effect] = formula_error(setting, with_contribution(hypothesis(), effect, change))
+    drift = fitted["thermal_drift"]
+    np.testing.assert_allclose(np.sqrt(np.diag(drift)), size, rtol=1e-9)
+    assert np.all(drift[places.record[:, None] != places.record] == 0.0)
+    # Near in time is alike, on which leg ever; near on the loop but on another leg is not.
+    first = np.flatnonzero(places.record == 0)
+    later = first[np.argmin(np.abs(places.time[first] - places.time[first[0]] - 0.5))]
+    correlation = drift / np.outer(size, size)
+    assert correlation[first[0], first[1]] > 0.9 > 0.2 > correlation[first[0], later]
+    slip = fitted["interface_slip"] / np.outer(change, change)
+    assert np.any(np.abs(slip[first[0]] - correlation[first[0]])[first] > 0.3)

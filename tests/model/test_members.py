@@ -1,5 +1,7 @@
 """The contract that every member of the registry keeps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.known import (
@@ -14,7 +16,7 @@ from support.known import (
 )
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.model.member import Stage
+from backdrive_bayes.model.member import Drive, Stage
 from backdrive_bayes.model.parameter import Scale
 from backdrive_bayes.model.path import TorquePath
 from backdrive_bayes.model.reducer import ReducerModel
@@ -184,3 +186,22 @@ def test_the_order_in_which_members_are_named_does_not_matter():
 def test_unknown_repeated_or_no_members_are_refused(names):
     with pytest.raises(BadInput):
         members_named(names)
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if getattr(MEMBERS[n], "of_time", False)])
+def test_what_is_of_the_time_alone_does_not_heed_the_torque(name):
+    path = zigzag()
+    values = as_arrays(typical_values(reducer({name, "elastic"})))
+    drives = [Drive(replace(path, torque_nm=t), RATED, angle_rad=t) for t in (path.torque_nm, -0.3 * path.torque_nm)]
+    one, other = (MEMBERS[name].respond(values, drive) for drive in drives)
+    np.testing.assert_array_equal(one, other)
+    assert np.ptp(one) > 0
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if hasattr(MEMBERS[n], "guesses")])
+def test_guesses_are_of_the_members_own_parameters(name):
+    angle, record = np.tile(np.linspace(0, 0.02, 50), 2), np.repeat([0, 1], 50)
+    rng = np.random.default_rng(0)
+    found = MEMBERS[name].guesses(angle, record, lambda columns: (rng.normal(size=columns.shape[:2]), rng.random(len(columns))))
+    own = {p.name: p.per_record for p in MEMBERS[name].parameters}
+    assert found and all(np.shape(v) == ((2,) if own[k] else ()) for guess in found for k, v in guess.items())

@@ -7,8 +7,11 @@ import numpy as np
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter, Uniform
 
-COUNTS = np.arange(4.5, 130.0, 0.25)
-"""Numbers of periods within the range of the angle that are looked through."""
+# A longer period would reproduce the angle itself.
+SHORTEST, LONGEST = 0.01, 0.45
+"""Periods in the angle scale, which is half the range of the angle."""
+COUNTS = np.arange(2 / LONGEST, 130.0, 0.25)
+"""Numbers of periods within the range that are looked through."""
 GUESSES = 3
 
 
@@ -21,8 +24,7 @@ class EncoderError:
     source = "interpolation error of sine-cosine encoders"
     parameters = (
         Parameter("encoder_amplitude", "rad", "angle", LogNormal(0.004, 1.0), 0.0, "thousandths of the peak angle"),
-        # A longer period would reproduce the angle itself.
-        Parameter("encoder_period", "rad", "angle", LogUniform(0.01, 0.45), None, "several periods within the loop"),
+        Parameter("encoder_period", "rad", "angle", LogUniform(SHORTEST, LONGEST), None, "several periods within the loop"),
         Parameter("encoder_harmonic", "1", "none", Uniform(0.0, 0.7), None, "sine and cosine of unequal size"),
         Parameter("encoder_harmonic_phase", "1", "none", Uniform(0.0, 1.0), None, "no preference"),
         Parameter("encoder_phase", "1", "none", Uniform(0.0, 1.0), None, "no preference", True),
@@ -32,14 +34,18 @@ class EncoderError:
         """What the error adds to the reading [rad], shape (…, samples)."""
         turn = 2 * np.pi * (drive.angle_rad / values["encoder_period"] + values["encoder_phase"])
         second = np.sin(2 * turn + 2 * np.pi * values["encoder_harmonic_phase"])
-        return values["encoder_amplitude"] * (np.sin(turn) + values["encoder_harmonic"] * second)
+        # Between samples the angle runs through part of a period, over which the error averages.
+        part = np.abs(np.gradient(drive.angle_rad, axis=-1)) / values["encoder_period"]
+        first = np.sinc(part) * np.sin(turn)
+        return values["encoder_amplitude"] * (first + np.sinc(2 * part) * values["encoder_harmonic"] * second)
 
     def guesses(self, angle_rad, record, taken_out):
         """The periods whose sine and cosine, each record with amplitudes of its own, take most out of what is unexplained."""
         periods = np.ptp(angle_rad) / COUNTS
         turn = 2 * np.pi * angle_rad / periods[:, None]
+        left = np.sinc(np.gradient(angle_rad) / periods[:, None])
         own = (np.arange(record.max() + 1)[:, None] == record)[None, :, None, :]
-        columns = own * np.stack([np.sin(turn), np.cos(turn)], axis=1)[:, None]
+        columns = own * np.stack([left * np.sin(turn), left * np.cos(turn)], axis=1)[:, None]
         found, gain = taken_out(columns.reshape(periods.size, -1, angle_rad.size))
         found = found.reshape(periods.size, -1, 2)
         peaks = [i for i in np.argsort(-gain) if gain[i] == gain[max(i - 4, 0) : i + 5].max()][:GUESSES]
