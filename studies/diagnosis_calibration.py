@@ -82,7 +82,9 @@ def weigh(job) -> dict:
 
 def told(result, chosen=CALIBRATION) -> dict[str, float]:
     """Probabilities by label under a calibration."""
-    labels = marginal(probabilities(Evidences.from_json(result["evidences"]), chosen))
+    if not isinstance(result["evidences"], Evidences):
+        result["evidences"] = Evidences.from_json(result["evidences"])
+    labels = marginal(probabilities(result["evidences"], chosen))
     return {label_of(name.split("+")) if name != "none" else name: p for name, p in labels.items()}
 
 

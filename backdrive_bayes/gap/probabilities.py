@@ -34,14 +34,14 @@ class Calibration:
     every reducer has and the baseline was asked to do without, whatever else there is.
     """
 
-    cool: float = 3.5
+    cool: float = 2.5
     warm: float = 13.0
     halfway: float = 40.0
     fast_temperature: float = 12.0
-    none: float = 0.5
-    single: float = 0.27
-    pair: float = 0.02
-    unknown: float = 0.21
+    none: float = 0.45
+    single: float = 0.275
+    pair: float = 0.025
+    unknown: float = 0.25
     remainder: float = 1.0
     fast: float = 0.05
     imprint: float = 3.4
@@ -50,7 +50,7 @@ class Calibration:
     module: float = 20.0
     slack: float = 0.1
     misfit: tuple[float, ...] = (0.76, 0.18, 0.04, 0.015, 0.005)
-    formula: tuple[float, ...] = (0.75, 0.22, 0.03)
+    formula: tuple[float, ...] = (0.85, 0.13, 0.02)
     unknown_level: tuple[float, ...] = (0.6, 0.25, 0.1, 0.05)
 
 
@@ -119,7 +119,8 @@ def _union(effects, fast):
 
 def _slow(evidences, c, hot):
     misfit, levels = (np.log(weights)[:, None] + np.log(c.formula) for weights in (c.misfit, c.unknown_level))
-    value = {effects: logsumexp(values + misfit) for effects, values in evidences.slow.items()}
+    weighed = np.array(list(evidences.slow.values())) + misfit
+    value = dict(zip(evidences.slow, logsumexp(weighed, axis=(1, 2)), strict=True))
     gain = {effects: v - value[NONE] for effects, v in value.items()}
     most = max(gain.values())
     temperature = _temperature(c, most, hot)
@@ -131,11 +132,10 @@ def _slow(evidences, c, hot):
         more -= c.slack * (most if effects == NONE else gain[effects])
         weight = c.unknown if effects == NONE else c.remainder * share(effects)
         strange.append(np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot))
-    large = np.array(MISFIT_LEVELS) >= LARGE_MISFIT
-    for effects, values in evidences.slow.items():
-        # Where a hypothesis needs a misfit well beyond the noise, something is left that it does not explain.
-        rest = logsumexp((values + misfit)[large]) - value[NONE] - c.slack * gain[effects]
-        strange.append(np.log(c.remainder * share(effects)) + rest / temperature)
+    # Where a hypothesis needs a misfit well beyond the noise, something is left that it does not explain.
+    rough = logsumexp(weighed[:, np.array(MISFIT_LEVELS) >= LARGE_MISFIT], axis=(1, 2)) - value[NONE]
+    for effects, rest in zip(evidences.slow, rough, strict=True):
+        strange.append(np.log(c.remainder * share(effects)) + (rest - c.slack * gain[effects]) / temperature)
     score[UNKNOWN] = logsumexp(strange)
     return _normalised(score)
 

@@ -7,10 +7,10 @@ import numpy as np
 from backdrive_bayes.model.member import Stage
 from backdrive_bayes.model.parameter import LogNormal, LogUniform, Parameter, Uniform
 
-# A longer period would reproduce the angle itself.
-SHORTEST, LONGEST = 0.01, 0.45
+# A longer period would reproduce the angle itself, a shorter one lies within a block: it is looked for in finer ones.
+SHORTEST, LONGEST = 0.02, 0.45
 """Periods in the angle scale, which is half the range of the angle."""
-COUNTS = np.arange(2 / LONGEST, 130.0, 0.25)
+COUNTS = np.arange(2 / LONGEST, 2 / SHORTEST, 0.25)
 """Numbers of periods within the range that are looked through."""
 GUESSES = 3
 
@@ -34,16 +34,14 @@ class EncoderError:
         """What the error adds to the reading [rad], shape (…, samples)."""
         turn = 2 * np.pi * (drive.angle_rad / values["encoder_period"] + values["encoder_phase"])
         second = np.sin(2 * turn + 2 * np.pi * values["encoder_harmonic_phase"])
-        # Between samples the angle runs through part of a period, over which the error averages.
-        part = np.abs(np.gradient(drive.angle_rad, axis=-1)) / values["encoder_period"]
-        first = np.sinc(part) * np.sin(turn)
-        return values["encoder_amplitude"] * (first + np.sinc(2 * part) * values["encoder_harmonic"] * second)
+        left = _left_of_wave(np.gradient(drive.angle_rad, axis=-1) / values["encoder_period"])
+        return values["encoder_amplitude"] * (left * np.sin(turn) + left**4 * values["encoder_harmonic"] * second)
 
     def guesses(self, angle_rad, record, taken_out):
         """The periods whose sine and cosine, each record with amplitudes of its own, take most out of what is unexplained."""
         periods = np.ptp(angle_rad) / COUNTS
         turn = 2 * np.pi * angle_rad / periods[:, None]
-        left = np.sinc(np.gradient(angle_rad) / periods[:, None])
+        left = _left_of_wave(np.gradient(angle_rad) / periods[:, None])
         own = (np.arange(record.max() + 1)[:, None] == record)[None, :, None, :]
         columns = own * np.stack([left * np.sin(turn), left * np.cos(turn)], axis=1)[:, None]
         found, gain = taken_out(columns.reshape(periods.size, -1, angle_rad.size))
@@ -56,3 +54,8 @@ class EncoderError:
             }
             for i in peaks
         ]  # fmt: skip
+
+
+def _left_of_wave(part):
+    """What is left of a wave averaged over ``part`` of a period: sinc to second order, of twice the part its fourth power."""
+    return np.exp(-((np.pi * part) ** 2) / 6)
