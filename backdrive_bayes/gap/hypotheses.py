@@ -15,6 +15,8 @@ from backdrive_bayes.model.registry import BASELINE, members_named
 SCREENED = 256
 STARTS = 3
 PROBE = 1e-4
+ENOUGH = 0.1
+"""Log posterior that a climb must gain in one of two steps to go on: evidences are told apart by more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ def joint_problem(setting: Setting, effects, whitening: Whitening) -> JointProbl
 
 def fit_from(problem: JointProblem, effects, starts, steps: tuple[int, int] = (6, 12), finalists: int = 2) -> Fitted:
     """The best mode reached from ``starts`` (starts, dimension): all climb the first number of steps, some the second."""
-    return linearised(problem, effects, best_mode(problem, starts, steps, finalists))
+    return linearised(problem, effects, best_mode(problem, starts, steps, finalists, ENOUGH))
 
 
 def linearised(problem: JointProblem, effects, z) -> Fitted:

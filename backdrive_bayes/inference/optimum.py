@@ -13,6 +13,8 @@ STEP = 1e-4
 DAMPINGS = np.array([0.01, 0.1, 1.0, 10.0, 100.0, 1e4])
 LONGEST_STEP = 2.0
 """In prior standard deviations, for any coordinate."""
+ENOUGH = 1e-3
+"""Log posterior that a climb must gain in one of two steps to go on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +36,10 @@ def find_optimum(problem: Problem, starts, max_steps: int = 80, first_steps: int
     return laplace(problem, best_mode(problem, starts, (first_steps, max_steps), finalists))
 
 
-def best_mode(problem: Problem, starts, steps: tuple[int, int], finalists: int) -> np.ndarray:
+def best_mode(problem: Problem, starts, steps: tuple[int, int], finalists: int, enough: float = ENOUGH) -> np.ndarray:
     """The same without the approximation, shape (dimension,); ``steps`` are the first steps and those of the finalists."""
-    z, value = climb(problem, np.atleast_2d(starts), steps[0])
-    z, value = climb(problem, z[np.argsort(-value)[:finalists]], steps[1])
+    z, value = climb(problem, np.atleast_2d(starts), steps[0], enough)
+    z, value = climb(problem, z[np.argsort(-value)[:finalists]], steps[1], enough)
     return z[np.argmax(value)]
 
 
@@ -59,7 +61,7 @@ def _scale2(problem, residual):
     return (problem.noise_dof + chi2) / (problem.noise_dof + problem.dof)
 
 
-def climb(problem: Problem, starts, max_steps: int):
+def climb(problem: Problem, starts, max_steps: int, enough: float = ENOUGH):
     """Levenberg-Marquardt from ``starts`` (starts, dimension), all at once: where they end, and the log posterior there.
 
     It is that of the reweighted least squares whose fixed point is the mode of the Student-t posterior.
@@ -78,7 +80,7 @@ def climb(problem: Problem, starts, max_steps: int):
             if gain > 0:
                 z[i], value[i] = z[i] + step[row, k], values[row, k]
             damping[i] = np.clip(trial[row, k] if gain > 0 else damping[i] * 100, 1e-8, 1e8)
-            stale[i] = stale[i] + 1 if gain < 1e-3 else 0
+            stale[i] = stale[i] + 1 if gain < enough else 0
     return z, value
 
 
