@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.decisions.evidence import Evidence
+from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
 from backdrive_bayes.decisions.expression import Expression, Wrong
 from backdrive_bayes.decisions.loops import SAME_RATE, NotAvailable, same
 from backdrive_bayes.decisions.quantities import Quantities
@@ -104,6 +104,8 @@ def _answer(claim: Claim, units: dict[str, Evidence], quantities) -> dict:
 
 def _ask(claim, units, quantities):
     """Draws of the answer (draws,), and the numbers behind it."""
+    if "lost_motion_rad" in claim.holds.text:
+        same_lost_motion([units[u] for u in sorted(claim.holds.units)])
     rates = _rates(claim, units)
     contexts = [rates] if claim.along == "rate" else [[r] for r in (rates if claim.every == "rate" else [_one(claim, rates)])]
     held, numbers = [], []

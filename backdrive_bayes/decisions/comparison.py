@@ -9,7 +9,7 @@ import numpy as np
 
 from backdrive_bayes.decisions.claims import Claims, answer
 from backdrive_bayes.decisions.conformance import share
-from backdrive_bayes.decisions.evidence import Evidence
+from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
 from backdrive_bayes.decisions.loops import SAME_AMPLITUDE, SAME_RATE, Loop, NotAvailable, same
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
@@ -114,7 +114,7 @@ def _indicators(a, b, matched, rope, level, rng):
     for name in UNITS:
         try:
             if name == "lost_motion_rad":
-                _same_lost_motion(a, b)
+                same_lost_motion([a, b])
             first, second = a.values(name, matched.first), b.values(name, matched.second)
         except NotAvailable as why:
             left_out[name] = str(why)
@@ -123,12 +123,6 @@ def _indicators(a, b, matched, rope, level, rng):
         if not (a.converged and b.converged):
             rows[name]["verdict"] = "inconclusive"
     return rows, left_out
-
-
-def _same_lost_motion(a, b):
-    one, other = (e.about["k"] * e.rated_torque for e in (a, b))
-    if not same(one, other, SAME_AMPLITUDE):
-        raise NotAvailable(f"lost motion was taken at ±{one:.3g} N·m and ±{other:.3g} N·m: give the same k·T_r")
 
 
 def contrast(first, second, rope: float, level: float, rng) -> dict:

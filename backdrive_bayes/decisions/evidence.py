@@ -9,13 +9,21 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops, measured_loops
+from backdrive_bayes.decisions.loops import SAME_AMPLITUDE, Loop, NotAvailable, find_loop, largest_loops, measured_loops, same
 from backdrive_bayes.decisions.prediction import LogError, error_between, shifted
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import CORE, indicator_draws
 from backdrive_bayes.inference.fit import Posterior
 from backdrive_bayes.inference.posterior_file import attributes_of
 from backdrive_bayes.results import DIAGNOSIS, INDICATORS, read_group, read_result
+
+
+def same_lost_motion(evidences) -> None:
+    """Raise NotAvailable where the units' lost motions were taken at different torques and must not be compared."""
+    taken = [e.about["k"] * e.rated_torque for e in evidences]
+    if any(not same(taken[0], t, SAME_AMPLITUDE) for t in taken[1:]):
+        shown = " and ".join(f"±{t:.3g} N·m" for t in taken)
+        raise NotAvailable(f"lost motion was taken at {shown}: give the same k·T_r")
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ import numpy as np
 
 from backdrive_bayes.decisions.series import FUNCTIONS
 from backdrive_bayes.indicators.draws import UNITS
+from backdrive_bayes.model.registry import MEMBERS
 
 CONSTANTS = {"arcmin": math.pi / 10800, "mJ": 1e-3}
 LONGEST, MOST_NODES = 600, 150
@@ -202,7 +203,7 @@ def _unit(node) -> str:
             return "1"
         return "N·m" if node.func.id in _PLACES else _unit(node.args[0])
     if isinstance(node, ast.Call):
-        return _unit(node.func)
+        return _unit_of_parameter(node) if getattr(node.func, "attr", "") == "parameter" else _unit(node.func)
     if isinstance(node, ast.Attribute):
         return (_OTHER_UNITS | UNITS).get(node.attr, "")
     if isinstance(node, ast.BinOp):
@@ -211,6 +212,11 @@ def _unit(node) -> str:
             return "1"
         return sides[0] if isinstance(node.op, ast.Add | ast.Sub) and sides[0] == sides[1] else ""
     return ""
+
+
+def _unit_of_parameter(node) -> str:
+    wanted = getattr(node.args[0], "value", None) if node.args else None
+    return next((p.unit for m in MEMBERS.values() for p in m.parameters if p.name == wanted), "")
 
 
 def _same_quantity(a, b):

@@ -20,7 +20,7 @@ from backdrive_bayes.figures.style import (
 CAPTION = (
     "Posterior of each limited indicator (histogram), its median (solid line), the limits (dashed lines; beyond them is out of "
     "limits) and the guard bands (shaded orange) that the median must keep free for acceptance. A cross marks the point estimate "
-    "of the classic least-squares fit, where it lies within the panel."
+    "of the classic least-squares fit, an arrow one that lies beyond the panel."
 )
 AT_MOST = 4
 """Limits in one figure."""
@@ -61,8 +61,8 @@ def _panel(panel, row):
             panel.axvspan(*sorted((limit, end)), color=ORANGE, alpha=0.35, linewidth=0, label="guard band")
             panel.axvline(limit, color=VERMILLION, linestyle=(0, (5, 2)), linewidth=1.4, label="limit")
     classic = row["naive"]["value"]
-    if classic is not None and left <= classic * factor <= right:
-        panel.plot(classic * factor, 0.06, linestyle="none", marker="x", color=BLACK, label="least squares")
+    if classic is not None:
+        _mark_classic(panel, classic * factor, left, right)
     panel.set(xlim=(left, right), ylim=(0, 1.12), yticks=[], xlabel=f"{drawn_words(row['indicator'])} [{unit or '–'}]")
     colour = {"accepted": GREEN, "rejected": VERMILLION}.get(row["verdict"], BLACK)
     predicted = ", predicted" if row["predicted"] else ""
@@ -71,6 +71,20 @@ def _panel(panel, row):
     panel.spines["left"].set_visible(False)
     few_ticks(panel, 4)
     panel.set_yticks([])
+
+
+def _mark_classic(panel, value, left, right):
+    """A cross, or an arrow at the edge with the value that lies beyond it."""
+    inside = left <= value <= right
+    at = float(np.clip(value, left, right))
+    marker = "x" if inside else ">" if value > right else "<"
+    panel.plot(at, 0.06, linestyle="none", marker=marker, color=BLACK, clip_on=inside, label="least squares" if inside else None)
+    if not inside:
+        side = -1 if value > right else 1
+        panel.annotate(
+            f"least squares\n{value:.3g}", (at, 0.06), xytext=(7 * side, -2), textcoords="offset points",
+            ha="right" if side < 0 else "left", va="bottom", bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 1},
+        )  # fmt: skip
 
 
 def _range(edges, counts, low, high):

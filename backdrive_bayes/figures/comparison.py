@@ -22,14 +22,16 @@ LOOPS = "Settled loops of the units at the same rate and amplitude, each about i
 ENERGY = "Torque–energy curves of the units at the same rate and amplitude: median and interval of each."
 RATIOS = (
     "Ratios of the indicators at matched rate and amplitude: median and interval, on a logarithmic scale. The grey band is the "
-    "region of practical equivalence."
+    "region of practical equivalence. Indicators of which not all draws are positive have no ratio."
 )
 MECHANISM = (
     "How each unit releases energy. Left: energy that geometric error and friction dissipate, as shares of S; what is "
-    "missing to 1 or goes beyond it is model error. Right: share of the absorbed energy W_abs that was stored elastically and "
-    "is given back. Medians with intervals."
+    "missing to 1 or goes beyond it is model error; bars end at 1.5. Right: share of the absorbed energy W_abs that was stored "
+    "elastically and is given back. Medians with intervals."
 )
 SHOWN = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
+MOST_OF_S = 1.5
+"""Where the axis of shares ends: of a small loop they can be anything."""
 SHARES = (("S_g_over_S", "geometric error", BLUE, ""), ("S_f_over_S", "friction", ORANGE, "////"))
 
 
@@ -74,12 +76,13 @@ def draw_ratios(comparison: dict, pair: int):
         panel = figure.subplots()
         step = 0.7 / max(1, len(both["conditions"]))
         for i, condition in enumerate(both["conditions"]):
-            look = SERIES[i % len(SERIES)]
+            look, label = SERIES[i % len(SERIES)], _condition(condition)
             for row, name in enumerate(shown):
                 ratio = (condition["indicators"].get(name) or {}).get("ratio")
                 if ratio:
                     at = row + (i - 0.5 * (len(both["conditions"]) - 1)) * step
-                    _whisker(panel, ratio, at, look, _condition(condition) if row == 0 else None)
+                    _whisker(panel, ratio, at, look, label)
+                    label = None
         rope = comparison["rope"]
         panel.axvspan(1 / (1 + rope), 1 + rope, color=GREY, alpha=0.35, linewidth=0)
         panel.axvline(1.0, color="black", linewidth=0.7)
@@ -103,7 +106,7 @@ def draw_mechanism(comparison: dict):
                 begin += _bar(left, record[key], row, begin, name, colour, hatch)
             _bar(right, record["elastic_share"], row, 0.0, "given back", SKY, "")
         left.axvline(1.0, color="black", linewidth=0.7)
-        left.set(xlim=(0, max(1.0, left.get_xlim()[1])), xlabel="share of S [–]", ylim=(len(bars) - 0.5, -0.5))
+        left.set(xlim=(0, min(max(1.0, left.get_xlim()[1]), MOST_OF_S)), xlabel="share of S [–]", ylim=(len(bars) - 0.5, -0.5))
         left.set_yticks(range(len(bars)), [f"{_short(name)}, {_condition(r)}" for name, r in bars])
         right.set(xlim=(0, 1), xlabel="given back/absorbed [–]")
         handles = [*zip(*left.get_legend_handles_labels(), strict=True), *zip(*right.get_legend_handles_labels(), strict=True)]

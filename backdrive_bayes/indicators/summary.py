@@ -150,9 +150,11 @@ def _core_json(bare, full, lost_motion_torque, level):
 
 
 def _loop_json(full, level):
-    bands = {}
+    # Where on its scale the encoder reads the loop is no property of the reducer: bands are those of the loop's shape.
+    middle = 0.5 * (full.rising.mean(axis=1) + full.falling.mean(axis=1))
+    shift, bands = np.median(middle) - middle[:, None], {}
     for branch in ("rising", "falling"):
-        lo, median, hi = np.quantile(getattr(full, branch), [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
+        lo, median, hi = np.quantile(getattr(full, branch) + shift, [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
         bands[f"{branch}_rad"] = {"median": median.tolist(), "lo": lo.tolist(), "hi": hi.tolist()}
     return {"torque_Nm": full.torque_nm.tolist(), **bands}
 

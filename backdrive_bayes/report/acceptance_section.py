@@ -7,7 +7,7 @@ from pathlib import Path
 from backdrive_bayes.figures.catalogue import caption, verdict_figures
 from backdrive_bayes.figures.style import display_unit, indicator_words, words
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
-from backdrive_bayes.report.numbers import interval_text, level_text, like_interval, probability_text, significant
+from backdrive_bayes.report.numbers import fixed, interval_text, level_text, like_interval, probability_text, significant
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import free, short_digest
 from backdrive_bayes.results import VERDICT, read_result
@@ -88,16 +88,17 @@ def _percent(share):
 
 def _limits(verdict, at_most=None):
     rows = verdict["limits"][:at_most]
-    columns = ["Indicator", "Unit", "Limit", f"Posterior, {level_text(verdict['level'])}", "p_c", "Verdict"]
+    columns = ["Indicator", "Unit", "Limit", f"Posterior, {level_text(verdict['level'])}", "p_c", "Verdict", "Least squares"]
     left = len(verdict["limits"]) - len(rows)
     more = f" {left} further limits follow on the next pages." if left > 0 else ""
     lost = any(r["indicator"] == "lost_motion_rad" for r in rows)
     at_k = f" δ is taken at ±kT_r with k = {verdict['k']:g}." if lost else ""
     return [
-        Table(columns, [_limit_cells(r) for r in rows], [1.5, 0, 0.9, 1.4, 0.6, 0.75]),
+        Table(columns, [_limit_cells(r) for r in rows], [1.5, 0, 0.95, 1.4, 0.6, 0.8, 0.85]),
         Note(
             f"Median [{level_text(verdict['level'])} interval] of the reducer's own settled loop; p_c: conformance "
-            f"probability.{at_k}{more}"
+            f"probability.{at_k} Least squares: the classic evaluation's point estimate and where it lies; its branches do not "
+            f"close at ±T and friction hides in its offset, so that it may differ by more than the interval.{more}"
         ),
     ]
 
@@ -111,12 +112,18 @@ def _limit_cells(row):
         interval_text(row, factor),
         probability_text(row["conformance_probability"]),
         row["verdict"],
+        _classic(row, factor),
     ]
 
 
+def _classic(row, factor):
+    value = row["naive"]["value"]
+    return "–" if value is None else [like_interval(value, row, factor), "inside" if row["naive"]["inside"] else "outside"]
+
+
 def _limit_text(row, factor):
-    """The limit with its own digits, which are exact."""
-    shown = [None if row[k] is None else f"{factor * row[k]:.5g}".replace("-", "−") for k in ("min", "max")]
+    """The limit with four digits."""
+    shown = [None if row[k] is None else f"{factor * row[k]:.4g}".replace("-", "−") for k in ("min", "max")]
     if None not in shown:
         return f"{shown[0]} to {shown[1]}"
     return f"at least {shown[0]}" if shown[1] is None else f"at most {shown[1]}"
@@ -127,16 +134,12 @@ def _more(verdict):
 
 
 def _risks(verdict):
-    columns = ["Indicator", "Unit", "Consumer's risk if accepted", "Producer's risk if rejected", "Guard band", "Least squares"]
+    columns = ["Indicator", "Unit", "Consumer's risk if accepted", "Producer's risk if rejected", "Guard band"]
     return [
         Heading("Risks"),
         Paragraph(_RULE),
-        Table(columns, [_risk_cells(r) for r in verdict["limits"]], [1.5, 0, 1.0, 1.0, 1.0, 0.9]),
-        Note(
-            "Probabilities are known to about ±0.5/√(effective draws). Least squares: the classic evaluation's point "
-            "estimate, and "
-            "what comparing it with the limit would say, as if it were exact."
-        ),
+        Table(columns, [_risk_cells(r) for r in verdict["limits"]], [1.5, 0, 1.0, 1.0, 1.0]),
+        Note("Of n effective draws, probabilities near a half are known to about ±0.5/√n, and none is known below 1/n."),
         *_global(verdict),
     ]
 
@@ -145,15 +148,12 @@ def _risk_cells(row):
     factor, unit = display_unit(row["unit"])
     bands = [("below_max", "max"), ("above_min", "min")]
     guard = " / ".join(significant(row["guard_band"][k], 2, factor) for k, limit in bands if row[limit] is not None)
-    classic = row["naive"]["value"]
-    naive = "–" if classic is None else [like_interval(classic, row, factor), "inside" if row["naive"]["inside"] else "outside"]
     return [
         [indicator_words(row["indicator"]), _at(row)],
         unit or "–",
         probability_text(row["specific_consumer_risk"]),
         probability_text(row["specific_producer_risk"]),
         guard,
-        naive,
     ]
 
 
@@ -175,7 +175,7 @@ def _global_cells(row):
     found = row["global"]
     process = found["process"]
     origin = f"{found['batch_units']} other units" if found["batch_units"] else f"stated, {process['shape']}"
-    shares = " / ".join(f"{100 * found[k]:.3g}" for k in ("accepted", "rejected", "inconclusive"))
+    shares = " / ".join(fixed(100 * found[k], 1) for k in ("accepted", "rejected", "inconclusive"))
     return [
         [indicator_words(row["indicator"]), _at(row)],
         [f"{_process(process, factor)} {unit}", origin],
@@ -194,17 +194,19 @@ def _structure(verdict):
     structure = verdict["structure"]
     rows = [[_model(m), probability_text(m["probability"])] for m in structure["models"]]
     rows += [[f"in no model at hand: {free(words(n))}", probability_text(p)] for n, p in structure["uncovered"].items()]
+    weighed = structure["diagnosed"] or len(rows) > 1
     told = (
         "Probabilities of the models that were averaged, with those of effects that a gap diagnosis found and no model holds."
-        if structure["diagnosed"] or len(rows) > 1
-        else "No gap diagnosis was given. What the model cannot follow is carried by its model error, within the intervals."
+        if weighed
+        else f"One model only: {rows[0][0]}. No gap diagnosis was given, so nothing here tells how probable it is; what it "
+        "cannot follow is carried by its model error, within the intervals."
     )
     found = verdict["convergence"]
     sampling = "The sampling converged" if found["converged"] else "The sampling has NOT converged"
     return [
         Heading("Models"),
         Paragraph(told),
-        Table(["Model", "Probability"], rows, [3, 1]),
+        *([Table(["Model", "Probability"], rows, [3, 1])] if weighed else []),
         Note(
             f"{sampling}: largest R-hat {significant(found['max_rhat'], 4)}, smallest tail ESS "
             f"{significant(found['min_tail_ess'], 4)}."

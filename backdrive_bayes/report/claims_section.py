@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 from backdrive_bayes.figures.style import shown_unit
 from backdrive_bayes.report.blocks import Heading, Note, Paragraph, Table
 from backdrive_bayes.report.numbers import interval_text, probability_text, significant
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import free
 
+_LETTER = re.compile(r"\b([A-Za-z]\w*)\.[A-Za-z]")
 MOST_NUMBERS = 3
 """Numbers behind a claim that are printed; all are in comparison.json."""
 
@@ -22,6 +25,7 @@ def claims(result) -> list:
     return [
         Heading("Claims"),
         Paragraph(f"Each claim is a question to the posteriors, answered with a probability. {letters}.{source} {_count(found)}"),
+        *_origins(result),
         Table(_COLUMNS, [_row(c) for c in found["claims"]], _WIDTHS),
         Note(
             f"“Holds” from a probability of {found['holds_from']:g}, “does not hold” up to {found['fails_below']:g}, “open” "
@@ -35,6 +39,13 @@ _COLUMNS = ["No.", "Claim and predicate", "Numbers behind it", "Probability", "V
 _WIDTHS = [0, 2.5, 1.9, 0.7, 0.8]
 NOTHING = 1e-6
 """Beside the largest of a series, values below this share of it are nothing."""
+
+
+def _origins(result) -> list:
+    """Where the units come from, where they say so: of a synthetic one a claim that holds tests the evaluation alone."""
+    origins = [(unit.get("identity") or {}).get("origin") for unit in result["units"]]
+    told = [f"{free(n, 40)}: {free(o, 200)}" for n, o in zip(result["names"], origins, strict=True) if o]
+    return [Paragraph(f"Origin of the units. {'; '.join(told)}.")] if told else []
 
 
 def _count(found):
@@ -64,8 +75,16 @@ def _row(claim):
 def _numbers(claim):
     found = claim["numbers"]
     shown = [n for n in found if n["at"] == found[0]["at"]][:MOST_NUMBERS]
-    texts = "; ".join(_number(n) for n in shown) or "–"
+    texts = "; ".join(_whose(n) + _number(n) for n in shown) or "–"
+    left = len(found) - len(shown)
+    texts += f"; {left} more in comparison.json" if left else ""
     return [texts, sentence(claim["reason"])] if claim["reason"] else texts
+
+
+def _whose(number):
+    """The letter of the unit, where a number is one unit's."""
+    letters = set(_LETTER.findall(number["what"]))
+    return f"{letters.pop()} " if len(letters) == 1 else ""
 
 
 def _number(number):

@@ -41,8 +41,8 @@ def chapter(folder: Path) -> Chapter:
             Heading("How each unit releases energy"),
             Picture("comparison-mechanism", caption("comparison-mechanism", level)),
             *_mechanism(result),
-            *rest,
             *_all_tables(result),
+            *rest,
             *_refused(result),
             *claims(result),
             *_reproduction(result),
@@ -53,8 +53,16 @@ def chapter(folder: Path) -> Chapter:
 
 def _banner(result):
     rows = [r for p in result["pairs"] for c in p["conditions"] for r in c["indicators"].values()]
-    if not result["converged"]:
-        return Banner("bad", "INCONCLUSIVE: the sampling of a unit has not converged", "Do not use these differences.")
+    lacking = [name for name in result["names"] if name not in _usable(result)]
+    if lacking and len(result["names"]) - len(lacking) < 2:
+        text = f"Not converged: {free(', '.join(lacking), 200)}. Do not use these differences."
+        return Banner("bad", "INCONCLUSIVE: the sampling has not converged", text)
+    if lacking:
+        text = (
+            f"Not converged: {free(', '.join(lacking), 200)}. Every comparison and claim with them is inconclusive and not to be "
+            "used; those of the other units stand."
+        )
+        return Banner("caution", "INCONCLUSIVE IN PART: the sampling of some units has not converged", text)
     clear = sum(r["verdict"] in ("greater", "less") for r in rows)
     same = sum(r["verdict"] == "equivalent" for r in rows)
     text = (
@@ -65,10 +73,17 @@ def _banner(result):
     return Banner("good", "COMPARED at matched rate and amplitude", text)
 
 
+def _usable(result) -> set[str]:
+    """Names of the units whose sampling converged."""
+    units = zip(result["names"], result["units"], strict=True)
+    return {name for name, unit in units if (unit.get("convergence") or {}).get("converged")}
+
+
 def _identity(result):
     rows = []
     for name, unit, fit in zip(result["names"], result["units"], result["reproduction"], strict=True):
-        about = free((unit.get("identity") or {}).get("description") or "", 80)
+        known = unit.get("identity") or {}
+        about = free("; ".join(str(known[k]) for k in ("description", "origin") if known.get(k)), 200)
         digest = fit.get("data_sha256")
         rows.append((free(name, 24), Free("; ".join(filter(None, [about, digest and f"data SHA-256 {short_digest(digest)}"])))))
     return Facts(rows)
@@ -77,7 +92,9 @@ def _identity(result):
 def _key_tables(result):
     """The six key indicators of every pair at one condition, for at most two pairs."""
     blocks = []
-    for pair in [p for p in result["pairs"] if p["conditions"]][:2]:
+    # Pairs that may be used come first.
+    ordered = sorted(result["pairs"], key=lambda p: not {p["first"], p["second"]} <= _usable(result))
+    for pair in [p for p in ordered if p["conditions"]][:2]:
         best = min(pair["conditions"], key=_from_default)
         blocks += [Heading(f"{free(pair['first'], 40)} and {free(pair['second'], 40)} at {_at(best)}"), _table(pair, best, KEY)]
     return [*blocks, Note(_legend(result))]
@@ -90,7 +107,8 @@ def _from_default(condition):
 
 def _legend(result):
     return (
-        f"Median [{level_text(result['level'])} interval]. Ratio: first over second. “Greater” and “less” are said of the first, "
+        f"Median [{level_text(result['level'])} interval]. Ratio: first over second; where not all draws of both are "
+        "positive, the difference first minus second. “Greater” and “less” are said of the first, "
         f"where it differs by more than {100 * result['rope']:.3g} % with a probability of {100 * result['clear']:.3g} %. "
         "P: the probability that the first is larger at all."
     )
@@ -110,13 +128,20 @@ def _table(pair, condition, names):
                 f"{indicator_words(name)} [{unit or '–'}]",
                 interval_text(row["first"], factor),
                 interval_text(row["second"], factor),
-                interval_text(row["ratio"]) if row["ratio"] else interval_text(row["difference"], factor),
+                _ratio_cell(row, factor, unit),
                 probability_text(row["probability_first_greater"]),
                 row["verdict"],
             ]
         )
     columns = ["Indicator", free(pair["first"], 24), free(pair["second"], 24), "Ratio", "P", "Verdict"]
     return Table(columns, rows, [4.0, 3.16, 3.16, 3.62, 1.3, 1.76])
+
+
+def _ratio_cell(row, factor, unit):
+    """The ratio, or the difference where one of the two may be zero or change its sign."""
+    if row["ratio"]:
+        return interval_text(row["ratio"])
+    return [interval_text(row["difference"], factor), f"difference [{unit or '–'}]"]
 
 
 def _all_tables(result):

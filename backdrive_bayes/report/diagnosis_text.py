@@ -33,7 +33,8 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
     if not saved.effects:
         return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))
     rivals = _rivals(saved)
-    named = "GAP FOUND, CAUSES STILL CONFUSABLE" if rivals else "GAP FOUND, CAUSE NAMED"
+    found = "GAP FOUND" if "none" not in saved.credible_set else "GAP PROBABLE"
+    named = f"{found}, CAUSES STILL CONFUSABLE" if rivals else f"{found}, CAUSE NAMED"
     title = "GAP OF UNKNOWN CAUSE" if saved.effects == ["unknown"] else named
     return "caution", title, Free(_join(answer_words(saved), where, rivals, _closed(saved)))
 
