@@ -3,7 +3,8 @@
     python studies/real_gaps.py --data ../shared/data/cycloidal --workers 2 --out reports/real-gaps
 
 Geometric error is withheld, then friction: the answer should hold it. With the whole baseline nobody knows the answer. Written:
-real_gaps.json, one entry a unit and baseline as it is found, and how often what was withheld was named. Data:
+real_gaps.json, one entry a unit and baseline as it is found (those there are left alone), and how often what was withheld was
+named. Data:
 github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
 """
 
@@ -64,12 +65,16 @@ def main():
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     folders = sorted(p.parent for p in options.data.glob("*/unit.toml"))
-    found = []
+    path = options.out / "real_gaps.json"
+    kept = json.loads(path.read_text()) if path.exists() else {"diagnoses": [], "named": []}
+    found = kept["diagnoses"]
+    done = {(r["unit"], r["withheld"]) for r in found}
+    jobs = [(folder, withheld) for withheld in WITHHELD for folder in folders if (folder.name, withheld) not in done]
     with ProcessPoolExecutor(options.workers) as pool:
-        for result in pool.map(study, [(folder, withheld) for withheld in WITHHELD for folder in folders]):
+        for result in pool.map(study, jobs):
             found.append(result)
             kept = {"credit": CREDIT, "named": [named(found, module) for module in WITHHELD[:-1]], "diagnoses": found}
-            (options.out / "real_gaps.json").write_text(json.dumps(kept, indent=1))
+            path.write_text(json.dumps(kept, indent=1))
             print(*(result[k] for k in ("unit", "withheld", "answer", "probabilities", "where", "seconds")), flush=True)
     for counts in kept["named"]:
         print(counts)
