@@ -4,8 +4,8 @@
 
 Geometric error is withheld, then friction: the answer should hold it. With the whole baseline nobody knows the answer. Written:
 real_gaps.json, one entry a unit and baseline as it is found (those there are left alone), and how often what was withheld was
-named. Data:
-github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
+named. Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not
+copied.
 """
 
 from __future__ import annotations
