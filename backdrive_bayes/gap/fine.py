@@ -64,7 +64,8 @@ def fine_legs(setting: Setting, fitted: Fitted) -> list[FineLeg]:
 
 def _slope(blocks):
     rise, run = np.abs(np.gradient(blocks.angle_rad)), np.abs(np.gradient(blocks.torque_nm))
-    return rise / np.maximum(run, 0.05 * np.median(run) + 1e-300)
+    # A rough torque may stand still in most of the blocks.
+    return rise / np.maximum(run, 0.05 * max(np.median(run), 0.1 * np.mean(run)) + 1e-300)
 
 
 def _smooth(residual, noise_sd):

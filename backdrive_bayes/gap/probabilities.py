@@ -100,6 +100,8 @@ def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) 
             both = _union(effects, name)
             joint[both] = joint.get(both, 0.0) + p * q * _share_beside(effects, name, both, calibration)
     total = sum(joint.values())
+    if not np.isfinite(total):
+        raise FloatingPointError("an evidence is not a number")
     return {effects: p / total for effects, p in joint.items()}
 
 

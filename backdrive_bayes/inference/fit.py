@@ -164,7 +164,8 @@ def _slope(blocks, angle):
     """dθ/dτ [rad/(N·m)] of the model at the blocks, taken over neighbours on the same leg."""
     rise = np.gradient(angle)
     run = np.abs(np.gradient(blocks.torque_nm))
-    typical = np.median(run) + 1e-300
+    # A rough torque may stand still in most of the blocks.
+    typical = max(np.median(run), 0.1 * np.mean(run)) + 1e-300
     return np.abs(rise) / np.maximum(run, 0.02 * typical)
 
 

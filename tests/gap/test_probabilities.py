@@ -118,3 +118,8 @@ def test_an_effect_that_needs_a_large_misfit_is_doubtful():
     rough = candidates(sensor_lag=100.0)
     rough.weighed[1].log_evidence = rough.weighed[1].log_evidence[::-1]
     assert labels(clean)["unknown"] < 0.05 and labels(rough)["unknown"] > 0.2
+
+
+def test_what_is_not_a_number_is_no_probability():
+    with pytest.raises(FloatingPointError):
+        labels(candidates(sensor_lag=3.0), Fast({"encoder_error": float("nan"), "stick_slip": -3.0, "vibration": -3.0}, {}))
