@@ -104,8 +104,7 @@ def _answer(claim: Claim, units: dict[str, Evidence], quantities) -> dict:
 
 def _ask(claim, units, quantities):
     """Draws of the answer (draws,), and the numbers behind it."""
-    if "lost_motion_rad" in claim.holds.text:
-        same_lost_motion([units[u] for u in sorted(claim.holds.units)])
+    same_lost_motion([units[u] for u in claim.holds.asked_of("lost_motion_rad")])
     rates = _rates(claim, units)
     contexts = [rates] if claim.along == "rate" else [[r] for r in (rates if claim.every == "rate" else [_one(claim, rates)])]
     held, numbers = [], []

@@ -80,6 +80,11 @@ class Expression:
         """The value; ``look_up(letter, method, arguments, keywords)`` gives a unit's quantity, ``along`` is the coordinate."""
         return _run(self.body, look_up, along)
 
+    def asked_of(self, method: str) -> list[str]:
+        """Letters of the units of which a quantity is asked, sorted."""
+        nodes = (n for n in ast.walk(self.body) if isinstance(n, ast.Attribute) and n.attr == method)
+        return sorted({n.value.id for n in nodes})
+
     def parts(self) -> list[tuple[str, ast.expr, str]]:
         """What stands behind the answer: text, node and unit of every compared quantity and of every tested series."""
         found: dict[str, tuple[str, ast.expr, str]] = {}

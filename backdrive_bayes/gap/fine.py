@@ -13,12 +13,14 @@ from scipy.linalg import cholesky, solve_triangular
 
 from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
-from backdrive_bayes.inference.covariance import block_covariance
+from backdrive_bayes.inference.covariance import block_covariance, local_slope
 from backdrive_bayes.inference.problem import path_of
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.reduction import reduce_record
 
 BLOCKS_PER_SEGMENT = 700
+LEAST_STEP = 0.05
+"""Share of a typical step of the torque that counts as the least one where slopes are taken."""
 SMOOTH_LENGTH = 0.04
 """Length scale of the smooth error along a leg, in legs of evenly counted blocks."""
 
@@ -47,7 +49,7 @@ def fine_legs(setting: Setting, fitted: Fitted) -> list[FineLeg]:
         noise = setting.problem.records[r].noise
         blocks = reduce_record(record, find_segments(record.time_s, record.torque_nm), noise, BLOCKS_PER_SEGMENT)
         residual = blocks.angle_rad - fitted.problem.model.angle(fitted.problem.values(fitted.z, r), path_of(blocks))
-        covariance = block_covariance(blocks, noise, _slope(blocks))
+        covariance = block_covariance(blocks, noise, local_slope(blocks.torque_nm, blocks.angle_rad, LEAST_STEP))
         for k, direction in enumerate(blocks.direction):
             own = np.flatnonzero(blocks.leg == k)
             if own.size < 20:
@@ -60,12 +62,6 @@ def fine_legs(setting: Setting, fitted: Fitted) -> list[FineLeg]:
             way = np.abs(blocks.torque_nm[own] - blocks.turning_nm[k])
             legs.append(FineLeg(r, way, blocks.angle_rad[own], blocks.mid_s[own], int(direction), lower, left))
     return legs
-
-
-def _slope(blocks):
-    rise, run = np.abs(np.gradient(blocks.angle_rad)), np.abs(np.gradient(blocks.torque_nm))
-    # A rough torque may stand still in most of the blocks.
-    return rise / np.maximum(run, 0.05 * max(np.median(run), 0.1 * np.mean(run)) + 1e-300)
 
 
 def _smooth(residual, noise_sd):

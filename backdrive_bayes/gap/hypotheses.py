@@ -88,7 +88,7 @@ def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, r
     z[:, ~own] = known.z[order]
     z[:, own] = rng.standard_normal((draws, own.sum()))
     flexible = Flexible.of(known, whitening)
-    for row, guess in zip(z, _guessed(problem, effect, known, flexible, whitening), strict=False):
+    for row, guess in zip(z, _guessed(problem, effect, known, setting.places.record, flexible, whitening), strict=False):
         _place(problem, row, guess)
     change = flexible.left((known.residual - problem.raw_residual(z)) @ whitening.matrix.T)
     size = np.einsum("ij,ij->i", change, change) + 1.0
@@ -100,7 +100,7 @@ def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, r
     return Screen(problem, starts, amount[best][:, None] * change[best])
 
 
-def _guessed(problem, effect, known, flexible, whitening) -> list[dict]:
+def _guessed(problem, effect, known, record, flexible, whitening) -> list[dict]:
     """The points that the effect itself takes for promising beside a known hypothesis, if it has an opinion."""
     member = next(m for m in problem.model.members if m.name == effect)
     if not hasattr(member, "guesses"):
@@ -114,7 +114,6 @@ def _guessed(problem, effect, known, flexible, whitening) -> list[dict]:
         return found, np.einsum("si,si->s", found, load)
 
     measured = np.concatenate([data.blocks.angle_rad for data in problem.records])
-    record = np.concatenate([np.full(data.blocks.count.size, r) for r, data in enumerate(problem.records)])
     return member.guesses(measured - known.residual, record, taken_out)
 
 

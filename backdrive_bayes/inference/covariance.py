@@ -35,6 +35,17 @@ def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0)
     return matrix + _path_covariance(blocks, slope_rad_per_nm)
 
 
+def local_slope(torque_nm, angle_rad, least: float) -> np.ndarray:
+    """|dθ/dτ| along blocks of the given torques and angles [rad/(N·m)], shape (blocks,), over neighbours.
+
+    A step of the torque shorter than the share ``least`` of a typical one counts as that long.
+    """
+    run = np.abs(np.gradient(torque_nm))
+    # A rough torque may stand still in most of the blocks.
+    typical = max(np.median(run), 0.1 * np.mean(run))
+    return np.abs(np.gradient(angle_rad)) / np.maximum(run, least * typical + 1e-300)
+
+
 def _path_covariance(blocks, slope):
     """Error of the straight torque path through each leg, in level and tilt, seen through the slope; (blocks, blocks)."""
     size = slope * np.sqrt(blocks.torque_trend_nm2)

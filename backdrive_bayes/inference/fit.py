@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.inference.chain_file import Unfinished
+from backdrive_bayes.inference.covariance import local_slope
 from backdrive_bayes.inference.diagnostics import Convergence, Outcome, diagnose_draws
 from backdrive_bayes.inference.discrepancy import Discrepancy, learn_discrepancy
 from backdrive_bayes.inference.noise_refinement import refine_noise
@@ -30,6 +31,8 @@ from backdrive_bayes.records.reduction import reduce_record
 
 BEND_NODES = 8
 """Points within a block at which the model's curvature is averaged."""
+LEAST_STEP = 0.02
+"""Share of a typical step of the torque that counts as the least one where slopes are taken."""
 MOST_BLOCKS = 1200
 """Blocks of all records together beyond which each record gets fewer."""
 BETTER_MODE = 5.0
@@ -117,7 +120,7 @@ def _refine(problem, optimum) -> Prepared:
     problem = replace(problem, misfit=0.0)
     discrepancy = learn_discrepancy(problem, optimum)
     angles = [problem.model.angle(problem.values(optimum.z, r), d.path) for r, d in enumerate(problem.records)]
-    slopes = [_slope(d.blocks, angle) for d, angle in zip(problem.records, angles, strict=True)]
+    slopes = [local_slope(d.blocks.torque_nm, angle, LEAST_STEP) for d, angle in zip(problem.records, angles, strict=True)]
     noise, path_sd = refine_noise(problem, optimum.z, discrepancy, slopes)
     records = tuple(
         RecordData.prepare(corrected_blocks(problem, optimum.z, r, path_sd), n, s, problem.records[r].path)
@@ -158,15 +161,6 @@ def corrected_blocks(problem: Problem, z, record: int, path_sd: float = 0.0):
         bend_rad=bend,
         torque_variance_nm2=np.maximum(blocks.torque_variance_nm2, path_sd**2),
     )
-
-
-def _slope(blocks, angle):
-    """dθ/dτ [rad/(N·m)] of the model at the blocks, taken over neighbours on the same leg."""
-    rise = np.gradient(angle)
-    run = np.abs(np.gradient(blocks.torque_nm))
-    # A rough torque may stand still in most of the blocks.
-    typical = max(np.median(run), 0.1 * np.mean(run)) + 1e-300
-    return np.abs(rise) / np.maximum(run, 0.02 * typical)
 
 
 def fit(

@@ -122,8 +122,8 @@ def _classic(row, factor):
 
 
 def _limit_text(row, factor):
-    """The limit with four digits."""
-    shown = [None if row[k] is None else f"{factor * row[k]:.4g}".replace("-", "−") for k in ("min", "max")]
+    """The limit with its own digits."""
+    shown = [None if row[k] is None else f"{factor * row[k]:.5g}".replace("-", "−") for k in ("min", "max")]
     if None not in shown:
         return f"{shown[0]} to {shown[1]}"
     return f"at least {shown[0]}" if shown[1] is None else f"at most {shown[1]}"

@@ -56,6 +56,14 @@ def test_a_probability_is_that_of_the_draws(tmp_path):
     assert found["numbers"][0]["median"] == pytest.approx(1.0, abs=0.005) and found["numbers"][0]["unit"] == "J"
 
 
+def test_lost_motions_taken_at_different_torques_are_not_compared(tmp_path):
+    units = evidence("a"), evidence("b", seed=1, k=0.05)
+    refused = ask(tmp_path, 'holds = "A.lost_motion_rad < B.lost_motion_rad"', *units)
+    assert refused["verdict"] == "not answered" and "±0.003 N·m and ±0.005 N·m" in refused["reason"]
+    for told in ("A.lost_motion_rad < B.peak_angle_rad", "A.lost_motion_rad < 1"):
+        assert ask(tmp_path, f'holds = "{told}"', *units)["verdict"] == "holds"
+
+
 def test_one_units_quantities_keep_together_and_two_units_do_not(tmp_path):
     """The planted fault: pairing draws of units by their number would make equal seeds agree for certain."""
     twins = [evidence("a"), evidence("b")]

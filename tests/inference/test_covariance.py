@@ -7,7 +7,7 @@ import pytest
 from support.bench import block_means, even_blocks, known_estimate, noise_paths, raw_covariance
 
 from backdrive_bayes.bench.known_truth import BenchNoise
-from backdrive_bayes.inference.covariance import BEND_ERROR, block_covariance, whitener
+from backdrive_bayes.inference.covariance import BEND_ERROR, block_covariance, local_slope, whitener
 from backdrive_bayes.inference.problem import RecordData
 from backdrive_bayes.records.reduction import Blocks
 
@@ -120,3 +120,11 @@ def test_offset_weights_are_generalised_least_squares():
     expected = inverse.sum(axis=0) / inverse.sum()
     np.testing.assert_allclose(data.offset_weight, expected, atol=1e-9)
     assert data.offset_sd_rad == pytest.approx(inverse.sum() ** -0.5, rel=1e-9)
+
+
+def test_slopes_stay_of_their_size_where_the_torque_stands_still_in_most_blocks():
+    still = np.repeat(np.arange(10.0), 30)
+    angle = np.linspace(0.0, 2e-2, still.size)
+    assert np.median(np.gradient(still)) == 0.0
+    smooth = local_slope(np.linspace(0.0, 9.0, still.size), angle, 0.05)
+    assert np.max(local_slope(still, angle, 0.05)) < 1e3 * np.max(smooth)

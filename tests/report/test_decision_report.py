@@ -19,6 +19,7 @@ from backdrive_bayes.report import report, sections
 from backdrive_bayes.report.blocks import Chapter, Heading, Paragraph
 from backdrive_bayes.report.claims_section import _count, _number
 from backdrive_bayes.report.numbers import interval_text, probability_text
+from backdrive_bayes.results import COMPARISON, read_result
 
 ARCMIN = 10800 / 3.141592653589793
 HOSTILE = "#strong[x] $y$ *b* @ref"
@@ -97,6 +98,21 @@ def test_a_comparison_holds_its_numbers(comparison):
         assert interval_text(row["first"], ARCMIN if row["unit"] == "rad" else 1e3) in text[0]
     assert "rates cannot be predicted" in whole and "Not compared" in whole
     assert "90 % interval" in text[0] and "±5 %" in text[0]
+
+
+def test_a_unit_that_has_not_converged_is_named_and_the_others_stand(tmp_path):
+    units = [evidence("a"), evidence("b", seed=1), evidence("c", seed=2, converged=False)]
+    write_json(tmp_path / "comparison.json", compare(units))
+    text, _ = pages(tmp_path)
+    assert "INCONCLUSIVE IN PART" in text[0] and "Not converged: c." in text[0]
+    assert "a and b at" in text[0]
+
+
+def test_a_difference_is_not_called_a_ratio(tmp_path):
+    write_json(tmp_path / "comparison.json", compare([evidence("a"), evidence("b", seed=1, loop_area_J=[1e-9] * 3, spread=2.0)]))
+    row = read_result(tmp_path / "comparison.json", COMPARISON)["pairs"][0]["conditions"][0]["indicators"]["loop_area_J"]
+    text, _ = pages(tmp_path)
+    assert row["ratio"] is None and f"{interval_text(row['difference'], 1e3)} difference [mJ]" in text[0]
 
 
 def test_claims_stand_with_probability_and_verdict(comparison):
