@@ -68,7 +68,7 @@ def weigh(job) -> dict:
     truth = label_of(bench.truth.answer)
     allowed = [name for name in CANDIDATES if name != truth] if removed else None
     candidates = weigh_all(setting, rng, allowed=allowed)
-    fast = weigh_fast(setting, candidates.best.fitted).within(allowed)
+    fast = weigh_fast(setting, candidates).within(allowed)
     planted = [
         {"name": p.name, "severity": p.severity, "height": round(p.height, 2), "limited": bool(p.limited)}
         for p in bench.truth.planted

@@ -131,7 +131,9 @@ def contrast(first, second, rope: float, level: float, rng) -> dict:
     difference = x - y
     positive = bool((x > 0).all() and (y > 0).all())
     ratio = x / y if positive else None
-    greater = float(np.searchsorted(np.sort(second), first, side="left").mean() / second.size)
+    # Equal draws, such as two zeros, speak for neither.
+    below = [np.searchsorted(np.sort(second), first, side=side).mean() / second.size for side in ("left", "right")]
+    greater = float(np.mean(below))
     equivalent = np.abs(difference) <= rope * 0.5 * np.median(np.abs(x) + np.abs(y)) if ratio is None else (
         (ratio <= 1 + rope) & (ratio >= 1 / (1 + rope))
     )

@@ -11,6 +11,7 @@ from backdrive_bayes.figures.style import words
 _INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
 FAR = 1000.0
 """Standard deviations beyond which a shift is no longer told or drawn: the parameter was as good as fixed."""
+WORTH_A_WORD = 0.1
 _GLOSS = {"unknown": "unknown (not listed)", "none": "none (no gap)"}
 
 
@@ -86,6 +87,14 @@ def answer_words(saved: Diagnosed) -> str:
     found = saved.answered()
     chances = f" ({chance(found[0]['probability'])})" if len(found) == 1 else ""
     return named[:1].upper() + named[1:] + chances
+
+
+def more_words(saved: Diagnosed) -> str:
+    """That something else acts beside the modules that are named, where that is likely; else empty."""
+    probability = saved.result["answer"].get("probability_of_more") or 0.0
+    if saved.inconclusive or probability < WORTH_A_WORD:
+        return ""
+    return f"Something that is not listed acts beside it ({chance(probability)})."
 
 
 def _probability(saved, effect):

@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 from backdrive_bayes.gap.evidence import log_evidence
 from backdrive_bayes.gap.hypotheses import Fitted, Flexible, fit_none, fit_screened, polished, rebased, screen, simplified
 from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
-from backdrive_bayes.model.registry import candidates_beside
+from backdrive_bayes.model.registry import BASELINE, candidates_beside
 
 REFERENCE = ("misfit", MISFIT_LENGTH, 0.5)
 """Misfit under which modes are searched."""
@@ -26,8 +26,10 @@ UNKNOWN_LEVELS = (1.0, 3.0, 10.0, 40.0)
 DOUBTED = 4
 """Best hypotheses beside which unexplained structure is looked for, the baseline being one more."""
 PAIRS_FITTED = 4
+COMPLETED = 3
+"""Best hypotheses without a module that every reducer has that are tried with it as well."""
 POLISHED = 3
-SEARCHES = 3
+SEARCHES = 5
 SETTLED = 6.0
 """Log posterior by which a fresh search may find a better mode before another is due: what shifts log odds by about one."""
 WORTHWHILE = 4.0
@@ -57,12 +59,12 @@ class Candidates:
     """Every hypothesis weighed.
 
     ``unexplained`` holds the log evidences (kinds, levels, errors) of structure beside the baseline and the best hypotheses.
-    ``settled`` tells whether a fresh search for the best one's mode came back to it.
+    ``regained`` is the log posterior by which the last fresh search for the best one's mode still beat it, 0 where it came back.
     """
 
     weighed: tuple[Weighed, ...]
     unexplained: dict[tuple[str, ...], np.ndarray]
-    settled: bool = True
+    regained: float = 0.0
 
     @property
     def best(self) -> Weighed:
@@ -92,20 +94,37 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
         known, other = sorted(pair, key=lambda n: -alone[n])
         found = screen(setting, singles[known], other, reference, rng, 128)
         weighed.append(_weigh(setting, fit_screened(found, pair, rng)))
-    weighed, settled = _settle(setting, _polish_best(setting, weighed, rng), rng)
+    for module in (n for n in names if n in BASELINE):
+        note(f"{module} beside the best without it")
+        weighed = _completed(setting, weighed, module, rng)
+    weighed, regained = _settle(setting, _polish_best(setting, weighed, rng), rng)
     note("what nothing explains")
     doubted = [weighed[0], *sorted(weighed[1:], key=lambda w: -w.height)[:DOUBTED]]
-    return Candidates(tuple(weighed), {w.effects: _unexplained(setting, w.fitted) for w in doubted}, settled)
+    return Candidates(tuple(weighed), {w.effects: _unexplained(setting, w.fitted) for w in doubted}, regained)
+
+
+def _completed(setting, weighed, module, rng):
+    """The same, the best hypotheses without a module that every reducer has also with it."""
+    reference, table = setting.whitening(REFERENCE), {frozenset(w.effects): w for w in weighed}
+    without = sorted((w for w in weighed if module not in w.effects), key=lambda w: -w.height)
+    for w in without[:COMPLETED]:
+        effects = (*w.effects, module)
+        if frozenset(effects) not in table:
+            found = screen(setting, w.fitted, module, reference, rng, 128)
+            weighed = [*weighed, _weigh(setting, fit_screened(found, effects, rng))]
+    return weighed
 
 
 def _polish_best(setting, weighed, rng):
     """The few most probable hypotheses, and the baseline, climbed to the end; what they hold begun anew from their modes."""
     table = {w.effects: w for w in weighed}
     order = sorted(table, key=lambda e: -table[e].height)
-    for effects in {(): None, **dict.fromkeys(order[:POLISHED])}:
+    # A module that the baseline was left without is hard to find from there.
+    held_back = [effects for effects in table if effects and set(effects) <= set(BASELINE)]
+    for effects in {(): None, **dict.fromkeys([*held_back, *order[:POLISHED]])}:
         table[effects] = _better(table[effects], _weigh(setting, polished(table[effects].fitted, rng)))
     best = max(table.values(), key=lambda w: w.height)
-    done = {(), best.effects, *order[:POLISHED]}
+    done = {(), best.effects, *held_back, *order[:POLISHED]}
     for effects in (e for e in table if e not in done):
         table[effects] = _better(table[effects], _weigh(setting, rebased(table[effects].fitted, best.fitted)))
     best = max(table.values(), key=lambda w: w.height)
@@ -117,27 +136,28 @@ def _polish_best(setting, weighed, rng):
 
 
 def _settle(setting, weighed, rng):
-    """The best hypothesis searched anew until that finds nothing that could matter; and whether it ever did so.
+    """The best hypothesis searched anew until that finds nothing that could matter; and what the last search still gained.
 
     What a search still gains might be gained for the next best as well: half the lead is enough. Where the best one gained, the
     next best are searched anew too.
     """
-    table, settled, gained = {w.effects: w for w in weighed}, False, False
+    table, regained, searched = {w.effects: w for w in weighed}, 0.0, False
     for _ in range(SEARCHES):
         best, *others = sorted(table.values(), key=lambda w: -w.height)
         lead = best.height - others[0].height if others else 0.0
         again = polished(best.fitted, rng)
         before, after = best.fitted.problem.log_posterior(np.array([best.fitted.z, again.z]))
-        settled = bool(after <= before + max(SETTLED, 0.5 * lead))
-        if settled:
+        regained = float(after - before)
+        if regained <= max(SETTLED, 0.5 * lead):
+            regained = 0.0
             break
-        table[best.effects], gained = _better(best, _weigh(setting, again)), True
-    if gained:
+        table[best.effects], searched = _better(best, _weigh(setting, again)), True
+    if searched:
         best, *others = sorted(table.values(), key=lambda w: -w.height)
         for other in (w for w in others[:POLISHED] if w.effects):
             for again in (rebased(other.fitted, best.fitted), polished(other.fitted, rng)):
                 table[other.effects] = _better(table[other.effects], _weigh(setting, again))
-    return [table[w.effects] for w in weighed], settled
+    return [table[w.effects] for w in weighed], regained
 
 
 def _better(one, other):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,10 +12,10 @@ from threadpoolctl import threadpool_limits
 from backdrive_bayes.gap import draws, next_test, where
 from backdrive_bayes.gap.candidates import REFERENCE, Candidates, Weighed, weigh_all
 from backdrive_bayes.gap.fast import Fast, weigh_fast
-from backdrive_bayes.gap.probabilities import Evidences, credible_set, marginal, probabilities
+from backdrive_bayes.gap.probabilities import Evidences, credible_set, lasting, marginal, probabilities, unexplained_beside
 from backdrive_bayes.gap.setting import Setting
-from backdrive_bayes.gap.shrink import closed_fraction, shrink
-from backdrive_bayes.indicators.summary import interval, loading_rate_nm_per_s
+from backdrive_bayes.gap.shrink import shrink
+from backdrive_bayes.indicators.summary import loading_rate_nm_per_s
 from backdrive_bayes.inference.discrepancy import amplitude_nm
 from backdrive_bayes.model.registry import BASELINE, candidates_beside
 from backdrive_bayes.records.check import check_unit
@@ -58,16 +57,30 @@ def _diagnose(unit, baseline, seed, allowed, k, progress):
     setting = Setting.of(unit, rng, baseline)
     candidates = weigh_all(setting, rng, progress, allowed)
     progress("looking for jumps, vibration and encoder error")
-    fast = weigh_fast(setting, candidates.best.fitted).within(allowed)
-    joint = probabilities(Evidences.of(candidates, fast))
+    fast = weigh_fast(setting, candidates).within(allowed)
+    evidences = Evidences.of(candidates, fast)
+    joint = probabilities(evidences)
     labels = marginal(joint)
-    effects = max(joint, key=joint.get)
+    likeliest = next(iter(labels))
+    effects = () if likeliest == "none" else tuple(likeliest.split("+"))
     progress("where, and how far it shrinks")
-    found = _Found(setting, candidates, fast, labels, effects, rng, k)
+    inconclusive = _why_inconclusive(unit, candidates, evidences)
+    found = _Found(setting, candidates, fast, labels, effects, unexplained_beside(joint, effects), inconclusive, rng, k)
     result = found.as_json(baseline, allowed)
     result["seconds"] = time.perf_counter() - began
     named = () if effects == ("unknown",) else effects
     return Diagnosis(result, named)
+
+
+def _why_inconclusive(unit, candidates, evidences) -> str:
+    """Why there is no verdict and what to do, empty where there is one."""
+    checked = check_unit(unit)
+    if not checked["may_infer"]:
+        return checked["reason"]
+    if not lasting(evidences, candidates.regained):
+        named = " + ".join(candidates.best.effects) or "the baseline"
+        return f"every fresh search still found a better fit of {named}: run it again with another --seed, or add a record"
+    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +90,15 @@ class _Found:
     fast: Fast
     labels: dict
     effects: tuple
+    unexplained: float
+    inconclusive: str
     rng: np.random.Generator
     k: float
 
     def as_json(self, baseline, allowed) -> dict:
         gap = where.estimate_gap(self.setting, self.candidates.none)
         cells = where.gap_map(self.setting, gap)
-        records = self.setting.problem.records
-        amplitudes = {d.blocks.name: amplitude_nm(self.setting.problem, r) for r, d in enumerate(records)}
+        amplitudes = {row["file"]: row["amplitude_Nm"] for row in self._records()}
         chosen = self._chosen()
         whitening = self.setting.whitening(REFERENCE)
         none = self.candidates.none.fitted
@@ -96,14 +110,7 @@ class _Found:
             "level": LEVEL,
             "k": self.k,
             "inconclusive": self.inconclusive,
-            "records": [
-                {
-                    "file": d.blocks.name,
-                    "loading_rate_Nm_per_s": loading_rate_nm_per_s(d),
-                    "amplitude_Nm": amplitudes[d.blocks.name],
-                }
-                for d in records
-            ],
+            "records": self._records(),
             "gap": self._gap(gap),
             "where": {"summary": where.summary(cells, amplitudes), "map": cells},
             "which": self._which(chosen, z_chosen, allowed),
@@ -114,6 +121,13 @@ class _Found:
             "residual": self._residual(none, chosen.fitted),
             "convergence": None,
         }
+
+    def _records(self):
+        return [
+            {"file": d.blocks.name, "loading_rate_Nm_per_s": loading_rate_nm_per_s(d)}
+            | {"amplitude_Nm": amplitude_nm(self.setting.problem, r)}
+            for r, d in enumerate(self.setting.problem.records)
+        ]
 
     def _chosen(self) -> Weighed:
         """The fitted hypothesis behind the answer: the best named one where the answer is unknown or was seen in fine blocks."""
@@ -151,43 +165,25 @@ class _Found:
     def _answer(self):
         # No name where there is no verdict.
         names = [] if self.inconclusive else list(self.effects)
-        return {"effects": names, "credible_set_90": credible_set(self.labels)}
-
-    @cached_property
-    def inconclusive(self) -> str:
-        """Why there is no verdict and what to do, empty where there is one."""
-        checked = check_unit(self.setting.unit)
-        if not checked["may_infer"]:
-            return checked["reason"]
-        if not self.candidates.settled:
-            named = " + ".join(self.candidates.best.effects) or "the baseline"
-            return f"every fresh search still found a better fit of {named}: run it again with another --seed, or add a record"
-        return ""
+        answer = {"effects": names, "credible_set_90": credible_set(self.labels)}
+        held_back = names and all(name in BASELINE for name in names)
+        return answer | ({"probability_of_more": self.unexplained} if held_back else {})
 
     def _shrink(self, none, chosen, gap, z_none, z_chosen):
-        found = shrink(self.setting, none, chosen.fitted, gap.weight, self.rng)
-        before, after = found.before.mean(axis=0), found.after.mean(axis=0)
-        floor, several = found.floor.mean(), len(self.setting.problem.records) > 1
-        control = closed_fraction(before, found.control.mean(axis=0), floor)
+        found, several = shrink(self.setting, none, chosen.fitted, gap.weight), len(self.setting.problem.records) > 1
         return {
             "held_out": "records left out in turn" if several else "legs left out in turn",
-            "before_rad": float(np.sqrt(np.median(before))),
-            "after_rad": float(np.sqrt(np.median(after))),
-            "noise_floor_rad": float(np.sqrt(floor)),
-            "closed_fraction": interval(closed_fraction(before, after, floor), LEVEL),
-            "records": [
-                {
-                    "record": name,
-                    "before_rad": float(np.sqrt(np.median(b))),
-                    "after_rad": float(np.sqrt(np.median(a))),
-                    "noise_floor_rad": float(np.sqrt(f)),
-                    "closed_fraction": interval(closed_fraction(b, a, f), LEVEL),
-                }
-                for name, b, a, f in zip(found.names, found.before, found.after, found.floor, strict=True)
-            ],
-            "gaussian_process": {"closed_fraction": interval(control, LEVEL)},
+            **self._shrunk(found),
+            "records": [{"record": name, **self._shrunk(found, fold)} for fold, name in enumerate(found.names)],
+            "indicators_at": self._records()[draws.widest(self.setting)],
+            "gaussian_process": {"closed_fraction": found.closed("control", self.rng, LEVEL)},
             "indicators": draws.indicator_change(self.setting, none, z_none, chosen.fitted, z_chosen, self.k, LEVEL),
         }
+
+    def _shrunk(self, found, fold=None):
+        rms = {f"{part}_rad": float(np.sqrt(found.mean_square(part, fold))) for part in ("before", "after")}
+        floor = float(np.sqrt(found.mean_square("floor", fold)))
+        return rms | {"noise_floor_rad": floor, "closed_fraction": found.closed("after", self.rng, LEVEL, fold)}
 
     def _next_test(self, whitening):
         fitted = {"+".join(sorted(w.effects)) or "none": w.fitted for w in self.candidates.weighed}

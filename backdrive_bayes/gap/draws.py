@@ -61,9 +61,14 @@ def shifts(before: Fitted, z_before, after: Fitted, z_after, level: float) -> li
     return rows
 
 
+def widest(setting: Setting) -> int:
+    """Number of the first record of the largest amplitude."""
+    return max(range(len(setting.problem.records)), key=lambda r: amplitude_nm(setting.problem, r))
+
+
 def indicator_change(setting: Setting, before: Fitted, z_before, after: Fitted, z_after, k: float, level: float) -> dict:
-    """δ, S and u of the first record of the largest amplitude before and after."""
-    record = max(range(len(setting.problem.records)), key=lambda r: amplitude_nm(setting.problem, r))
+    """δ, S and u of :func:`widest` before and after."""
+    record = widest(setting)
     out = {name: {} for name in SHOWN}
     for key, fitted, z in (("before", before, z_before), ("after", after, z_after)):
         lost_motion_at = k * setting.unit.rated_torque_nm

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.special import ive, logsumexp
 
+from backdrive_bayes.gap.candidates import Candidates
 from backdrive_bayes.gap.fine import FineLeg, fine_legs
-from backdrive_bayes.gap.hypotheses import Fitted
 from backdrive_bayes.gap.setting import Setting
 
 ENCODER_ERROR, STICK_SLIP, VIBRATION = "encoder_error", "stick_slip", "vibration"
@@ -43,8 +43,25 @@ class Fast:
         return replace(self, log_evidence=known | {VIBRATION: max(v for n, v in self.log_evidence.items() if n not in known)})
 
 
-def weigh_fast(setting: Setting, fitted: Fitted) -> Fast:
-    """Weigh every kind of fast structure beside a fitted hypothesis."""
+def weigh_fast(setting: Setting, candidates: Candidates) -> Fast:
+    """Weigh every kind of fast structure beside the best hypothesis.
+
+    An error of the encoder that was fitted to wide blocks may have taken the teeth of stick-slip: where these say more without it
+    than it gained, it is left out.
+    """
+    best = candidates.best
+    found = _weigh_beside(setting, best.fitted)
+    if ENCODER_ERROR in best.effects:
+        other = max((w for w in candidates.weighed if ENCODER_ERROR not in w.effects), key=lambda w: w.height)
+        without = _weigh_beside(setting, other.fitted)
+        teeth = without.log_evidence[STICK_SLIP]
+        more = teeth - found.log_evidence[STICK_SLIP] > best.height - other.height
+        if more and teeth > without.log_evidence[ENCODER_ERROR]:
+            return without
+    return found
+
+
+def _weigh_beside(setting, fitted):
     legs = fine_legs(setting, fitted)
     saw, jumps = _saw_of_torque(setting, legs, _torque_periods(setting)), _jumps(legs)
     found = {

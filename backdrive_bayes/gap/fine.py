@@ -19,8 +19,6 @@ from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.reduction import reduce_record
 
 BLOCKS_PER_SEGMENT = 700
-LEAST_STEP = 0.05
-"""Share of a typical step of the torque that counts as the least one where slopes are taken."""
 SMOOTH_LENGTH = 0.04
 """Length scale of the smooth error along a leg, in legs of evenly counted blocks."""
 
@@ -48,8 +46,10 @@ def fine_legs(setting: Setting, fitted: Fitted) -> list[FineLeg]:
     for r, record in enumerate(setting.unit.records):
         noise = setting.problem.records[r].noise
         blocks = reduce_record(record, find_segments(record.time_s, record.torque_nm), noise, BLOCKS_PER_SEGMENT)
-        residual = blocks.angle_rad - fitted.problem.model.angle(fitted.problem.values(fitted.z, r), path_of(blocks))
-        covariance = block_covariance(blocks, noise, local_slope(blocks.torque_nm, blocks.angle_rad, LEAST_STEP))
+        modelled = fitted.problem.model.angle(fitted.problem.values(fitted.z, r), path_of(blocks))
+        residual = blocks.angle_rad - modelled
+        # The measured angle's own jumps are what is looked for: they are no slope.
+        covariance = block_covariance(blocks, noise, local_slope(blocks, modelled))
         for k, direction in enumerate(blocks.direction):
             own = np.flatnonzero(blocks.leg == k)
             if own.size < 20:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from backdrive_bayes.inference.covariance import local_slope
 from backdrive_bayes.inference.discrepancy import LoopCoordinate, amplitude_nm
 from backdrive_bayes.inference.problem import Problem
 
@@ -100,8 +101,7 @@ def _slope(problem, z, record):
     """|dθ/dτ| [rad/(N·m)] of a record along the baseline's loop, shape (blocks,)."""
     data = problem.records[record]
     angle = problem.model.angle(problem.values(z, record), data.path)
-    run = np.maximum(np.abs(np.gradient(data.blocks.torque_nm)), 1e-4 * amplitude_nm(problem, record))
-    return np.abs(np.gradient(angle)) / run
+    return local_slope(data.blocks, angle, RIPPLE * data.noise.torque_nm)
 
 
 def _ripple(data, slope):

@@ -91,7 +91,11 @@ class Evidences:
 
 
 def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) -> dict[tuple[str, ...], float]:
-    """Probability of every set of effects, () for none and ("unknown",) for something not in the library; they sum to one."""
+    """Probability of every set of effects, () for none and ("unknown",) for something not in the library; they sum to one.
+
+    Where something unknown acts beside an effect the whole is unknown, but a module that the baseline was left without stays
+    named: (module, "unknown").
+    """
     quick = _fast(evidences.fast, calibration)
     slow = {hot: _slow(evidences, calibration, hot) for hot in (1.0, calibration.imprint)}
     joint: dict[tuple[str, ...], float] = {}
@@ -108,15 +112,20 @@ def probabilities(evidences: Evidences, calibration: Calibration = CALIBRATION) 
 def _share_beside(effects, fast, both, c):
     """Prior share of slow ``effects`` beside fast structure, ``both`` together being what is answered."""
     number = sum(name not in BASELINE for name in both)
-    if number > 2 or (effects == UNKNOWN and fast not in (None, VIBRATION)):
+    if number > 2 or (effects[-1:] == UNKNOWN and fast not in (None, VIBRATION)):
         return c.triple
     return c.beside if both != effects and number == 2 else 1.0
 
 
 def _union(effects, fast):
-    if fast == VIBRATION or effects == UNKNOWN:
-        return UNKNOWN
+    if fast == VIBRATION or effects[-1:] == UNKNOWN:
+        return _with_something_else(effects)
     return effects if fast is None or fast in effects else tuple(sorted((*effects, fast)))
+
+
+def _with_something_else(effects):
+    """What is answered where something unknown acts beside ``effects``."""
+    return tuple(name for name in effects if name in BASELINE) + UNKNOWN
 
 
 def _slow(evidences, c, hot):
@@ -128,18 +137,31 @@ def _slow(evidences, c, hot):
     temperature = _temperature(c, most, hot)
     share = _prior([effects[0] for effects in evidences.slow if len(effects) == 1], c)
     score = {effects: np.log(share(effects)) + g / temperature for effects, g in gain.items()}
-    strange = []
+    strange: dict[tuple[str, ...], list[float]] = {}
     for effects, values in evidences.unexplained.items():
         more = logsumexp(values + levels) - np.log(len(values)) - value[effects]
         more -= c.slack * (most if effects == NONE else gain[effects])
         weight = c.unknown if effects == NONE else c.remainder * share(effects)
-        strange.append(np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot))
+        told = np.log(weight) + gain[effects] / temperature + more / _temperature(c, abs(more), hot)
+        strange.setdefault(_with_something_else(effects), []).append(told)
     # Where a hypothesis needs a misfit well beyond the noise, something is left that it does not explain.
     rough = logsumexp(weighed[:, np.array(MISFIT_LEVELS) >= LARGE_MISFIT], axis=(1, 2)) - value[NONE]
     for effects, rest in zip(evidences.slow, rough, strict=True):
-        strange.append(np.log(c.remainder * share(effects)) + (rest - c.slack * gain[effects]) / temperature)
-    score[UNKNOWN] = logsumexp(strange)
-    return _normalised(score)
+        told = np.log(c.remainder * share(effects)) + (rest - c.slack * gain[effects]) / temperature
+        strange.setdefault(_with_something_else(effects), []).append(told)
+    return _normalised(score | {effects: logsumexp(told) for effects, told in strange.items()})
+
+
+def lasting(evidences: Evidences, regained: float, calibration: Calibration = CALIBRATION) -> bool:
+    """Whether an answer stands although a search still gained log posterior.
+
+    It does where that shifts log odds by no more than one, or by half of what the answer is ahead of the next: other hypotheses
+    might have gained as much.
+    """
+    value = {effects: values.max() for effects, values in evidences.slow.items()}
+    first, second = list(marginal(probabilities(evidences, calibration)).values())[:2]
+    ahead = np.log(first / max(second, 1e-300))
+    return regained <= _temperature(calibration, max(value.values()) - value[NONE], 1.0) * max(1.0, 0.5 * ahead)
 
 
 def _temperature(c, gain, hot):
@@ -171,9 +193,26 @@ def _normalised(score):
 
 
 def marginal(joint: dict[tuple[str, ...], float]) -> dict[str, float]:
-    """Probability by label: single names, 'a+b' for pairs, 'unknown', 'none'; highest first."""
-    named = {"+".join(k) if k else "none": p for k, p in joint.items()}
+    """Probability by label: single names, 'a+b' for pairs, 'unknown', 'none'; highest first.
+
+    A module counts with and without something unknown beside it.
+    """
+    named: dict[str, float] = {}
+    for effects, p in joint.items():
+        label = "+".join(named_of(effects)) or "none"
+        named[label] = named.get(label, 0.0) + p
     return dict(sorted(named.items(), key=lambda item: -item[1]))
+
+
+def named_of(effects: tuple[str, ...]) -> tuple[str, ...]:
+    """The names of an answer: what is unknown beside a named module is left out."""
+    return effects[:-1] if len(effects) > 1 and effects[-1:] == UNKNOWN else effects
+
+
+def unexplained_beside(joint: dict[tuple[str, ...], float], effects: tuple[str, ...]) -> float:
+    """Probability that something unknown acts beside the named modules, given that these are the answer."""
+    more, alone = joint.get((*effects, *UNKNOWN), 0.0), joint.get(effects, 0.0)
+    return more / (more + alone) if more + alone > 0 else 0.0
 
 
 def credible_set(labels: dict[str, float], level: float = 0.9) -> list[str]:

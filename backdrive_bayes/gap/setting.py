@@ -11,6 +11,7 @@ from scipy.linalg import block_diag, cholesky, solve_triangular
 from backdrive_bayes.gap.kernels import Places
 from backdrive_bayes.inference.fit import prepare
 from backdrive_bayes.inference.problem import Problem
+from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
 MOST_BLOCKS = 640
@@ -63,7 +64,8 @@ class Setting:
 
     @classmethod
     def of(cls, unit: Unit, rng, baseline) -> Setting:
-        """Reduce, fit the baseline, tell noise from misfit."""
+        """Leave wild samples out, reduce, fit the baseline, tell noise from misfit."""
+        unit = without_wild(unit)
         per_segment = int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 40, 110))
         prepared = prepare(unit, rng, baseline, blocks_per_segment=per_segment)
         problem = prepared.problem

@@ -1,7 +1,7 @@
 """How far the gap shrinks on data left out of the fit once an effect is added, with a flexible control beside it.
 
-Records are left out in turn, or cycles where there is one record. The fits without them are those of the model made linear at
-its joint mode; the encoder's offset and the past of what is left out are taken from itself, before and after alike.
+Records are left out in turn, or legs where there is one record. What is compared is the prediction by the parameters' mode given
+the rest; the encoder's offset and the past of what is left out are taken from itself, before and after alike.
 """
 
 from __future__ import annotations
@@ -11,34 +11,65 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 
-from backdrive_bayes.gap.hypotheses import Fitted
+from backdrive_bayes.gap.draws import Z_BOUND
+from backdrive_bayes.gap.hypotheses import Fitted, linearised
 from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
 
-DRAWS = 200
+STEPS = 4
+RESAMPLED = 400
 SMALLEST_GAP = 0.2
 MISFIT = ("misfit", MISFIT_LENGTH, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
 class Shrink:
-    """Mean square of what is left out [rad²] by fold: before, after and control (folds, draws), noise floor (folds,)."""
+    """What is left out, piece by piece (half legs), arrays of shape (pieces,).
+
+    ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``, ``control`` and
+    ``floor`` are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the control, and noise.
+    """
 
     names: tuple[str, ...]
+    fold: np.ndarray
+    share: np.ndarray
     before: np.ndarray
     after: np.ndarray
-    floor: np.ndarray
     control: np.ndarray
+    floor: np.ndarray
+
+    def mean_square(self, part: str, fold: int | None = None) -> float:
+        """Mean square [rad²] of one part in one fold, or over all of them."""
+        own = np.full(self.fold.size, True) if fold is None else self.fold == fold
+        return float(getattr(self, part)[own].sum() / self.share[own].sum())
+
+    def closed(self, part: str, rng, level: float, fold: int | None = None) -> dict:
+        """Closed fraction of ``after`` or ``control``, and its central interval where other pieces would have been left out.
+
+        The interval is that of a Bayesian bootstrap over pieces (Rubin, Annals of Statistics 9, 1981).
+        """
+        own = np.full(self.fold.size, True) if fold is None else self.fold == fold
+        weight = np.concatenate([np.ones((1, own.sum())), rng.standard_exponential((RESAMPLED, own.sum()))])
+        share = weight @ self.share[own]
+        fraction = closed_fraction(*(weight @ getattr(self, name)[own] / share for name in ("before", part, "floor")))
+        lo, hi = np.quantile(fraction, [0.5 - level / 2, 0.5 + level / 2])
+        middle = float(fraction[0])
+        return {"median": middle, "lo": min(float(lo), middle), "hi": max(float(hi), middle)}
 
 
-def shrink(setting: Setting, before: Fitted, after: Fitted, weight, rng) -> Shrink:
+def shrink(setting: Setting, before: Fitted, after: Fitted, weight) -> Shrink:
     """Predict every fold from the others; ``weight`` (blocks,) is the torque that a block spans."""
-    folds = _folds(setting)
-    rows = []
-    for own in folds.values():
-        floor = float(np.average(np.diag(setting.noise)[own], weights=weight[own]))
-        lost = [_left_out(setting, fitted, own, weight, rng) for fitted in (before, after)]
-        rows.append((*lost, floor, _control(setting, before, own, weight, rng)))
-    return Shrink(tuple(folds), *(np.array([row[i] for row in rows]) for i in range(4)))
+    torque = np.concatenate([d.blocks.torque_nm for d in setting.problem.records])
+    leg = np.concatenate([d.blocks.leg for d in setting.problem.records])
+    columns = []
+    for number, own in enumerate(_folds(setting).values()):
+        share = weight[own] / weight[own].sum()
+        piece = np.unique(np.stack([setting.places.record[own], leg[own], torque[own] > 0]), axis=1, return_inverse=True)[1]
+        squares = (*(_left_out(setting, f, own, share) for f in (before, after)), _control(setting, before, own, share))
+        parts = (share, *squares, share * np.diag(setting.noise)[own])
+        sums = np.array([np.bincount(piece.ravel(), p) for p in parts])
+        columns.append(np.concatenate([np.full((1, sums.shape[1]), number), sums]))
+    fold, *rest = np.concatenate(columns, axis=1)
+    return Shrink(tuple(_folds(setting)), fold, *rest)
 
 
 def _folds(setting):
@@ -50,17 +81,14 @@ def _folds(setting):
     return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in range(1, legs.max() + 1)} or {"all": np.arange(legs.size)}
 
 
-def _left_out(setting, fitted, own, weight, rng):
-    """Mean square residual on ``own`` of draws fitted to the rest, shape (draws,)."""
-    rest = np.setdiff1d(np.arange(setting.places.record.size), own)
-    mean, factor = _posterior(setting, fitted, rest)
-    z = mean + rng.standard_normal((DRAWS, mean.size)) @ factor.T
-    residual = fitted.residual[own] + (z - fitted.z) @ fitted.jacobian[own].T
-    nuisance = np.column_stack([np.ones(own.size), fitted.jacobian[np.ix_(own, _own_coordinates(setting, fitted, own))]])
-    root = np.sqrt(weight[own] / weight[own].sum())
+def _left_out(setting, fitted, own, share):
+    """Squared residual on ``own`` of what the rest predicts, times the blocks' shares, shape (own blocks,)."""
+    mode = _mode(setting, fitted, np.setdiff1d(np.arange(setting.places.record.size), own))
+    nuisance = np.column_stack([np.ones(own.size), mode.jacobian[np.ix_(own, _own_coordinates(setting, mode, own))]])
+    root = np.sqrt(share)
     basis = np.linalg.qr(nuisance * root[:, None])[0]
-    residual = residual * root
-    return np.sum((residual - (residual @ basis) @ basis.T) ** 2, axis=1)
+    residual = mode.residual[own] * root
+    return (residual - basis @ (basis.T @ residual)) ** 2
 
 
 def _own_coordinates(setting, fitted, own):
@@ -68,31 +96,38 @@ def _own_coordinates(setting, fitted, own):
     return [i for i, c in enumerate(fitted.problem.coordinates) if c.record in record]
 
 
-def _posterior(setting, fitted, rows):
-    """Mean and a square root of the covariance of the coordinates given some blocks only."""
+def _mode(setting, fitted, rows):
+    """The hypothesis at its mode given some blocks only, by a few Gauss-Newton steps from its joint mode."""
     lower = cholesky(setting.covariance(MISFIT)[np.ix_(rows, rows)], lower=True)
     ones = (setting.places.record[rows][:, None] == np.unique(setting.places.record[rows])).astype(float)
-    white = solve_triangular(lower, np.column_stack([fitted.residual[rows], fitted.jacobian[rows], ones]), lower=True)
-    basis = np.linalg.qr(white[:, fitted.z.size + 1 :])[0]
-    white = white[:, : fitted.z.size + 1]
-    white = white - basis @ (basis.T @ white)
-    residual, jacobian = white[:, 0] - white[:, 1:] @ fitted.z, white[:, 1:]
-    covariance = np.linalg.inv(np.eye(fitted.z.size) + jacobian.T @ jacobian)
-    return -covariance @ (jacobian.T @ residual), np.linalg.cholesky(covariance + 1e-14 * np.eye(fitted.z.size))
+    basis = np.linalg.qr(solve_triangular(lower, ones, lower=True))[0]
+
+    def white(values):
+        values = solve_triangular(lower, values[rows], lower=True)
+        return values - basis @ (basis.T @ values)
+
+    def cost(z):
+        left = white(fitted.problem.raw_residual(z).T)
+        return np.sum(left**2, axis=0) + np.sum(z**2, axis=1)
+
+    for _ in range(STEPS):
+        residual, jacobian = white(fitted.residual), white(fitted.jacobian)
+        normal = np.eye(fitted.z.size) + jacobian.T @ jacobian
+        step = -np.linalg.solve(normal, jacobian.T @ residual + fitted.z)
+        tried = np.clip(fitted.z + np.array([[0.0], [0.25], [0.5], [1.0]]) * step, -Z_BOUND, Z_BOUND)
+        best = tried[int(np.argmin(cost(tried)))]
+        fitted = linearised(fitted.problem, fitted.effects, best)
+    return fitted
 
 
-def _control(setting, fitted, own, weight, rng):
-    """Mean square residual when draws of a Gaussian process over the loop, fitted to the rest, predict ``own``, (draws,)."""
+def _control(setting, fitted, own, share):
+    """The same of a Gaussian process over the loop that was fitted to the rest of the baseline's residual, (own blocks,)."""
     rest = np.setdiff1d(np.arange(setting.places.record.size), own)
     kernel = setting.kernel("loop", MISFIT_LENGTH) * np.var(fitted.residual)
     factor = cho_factor(kernel[np.ix_(rest, rest)] + setting.noise[np.ix_(rest, rest)], lower=True)
     left = fitted.residual[rest] - _record_means(fitted.residual, setting.places.record)[rest]
-    solved = cho_solve(factor, kernel[np.ix_(rest, own)])
-    spread = kernel[np.ix_(own, own)] - kernel[np.ix_(own, rest)] @ solved
-    lower = np.linalg.cholesky(spread + 1e-9 * np.trace(spread) / own.size * np.eye(own.size))
-    residual = fitted.residual[own] - left @ solved - rng.standard_normal((DRAWS, own.size)) @ lower.T
-    share = weight[own] / weight[own].sum()
-    return ((residual - (residual @ share)[:, None]) ** 2) @ share
+    residual = fitted.residual[own] - kernel[np.ix_(own, rest)] @ cho_solve(factor, left)
+    return share * (residual - residual @ share) ** 2
 
 
 def _record_means(values, record):

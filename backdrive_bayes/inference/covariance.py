@@ -10,6 +10,8 @@ from backdrive_bayes.records.reduction import Blocks
 
 BEND_ERROR = 0.3
 """Relative standard error of the correction for the curve's bend within a block: it was made at one mode, of one past."""
+SHORTEST_RUN = 1e-4
+"""Least step of the torque over which a slope is taken, in the range of the torque."""
 
 
 def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0) -> np.ndarray:
@@ -35,15 +37,25 @@ def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0)
     return matrix + _path_covariance(blocks, slope_rad_per_nm)
 
 
-def local_slope(torque_nm, angle_rad, least: float) -> np.ndarray:
-    """|dθ/dτ| along blocks of the given torques and angles [rad/(N·m)], shape (blocks,), over neighbours.
+def local_slope(blocks: Blocks, angle_rad, least_nm: float = 0.0) -> np.ndarray:
+    """|dθ/dτ| of an angle at the blocks [rad/(N·m)], shape (blocks,), each leg by itself.
 
-    A step of the torque shorter than the share ``least`` of a typical one counts as that long.
+    It is a secant over the neighbours, and over no less than the error of a block's own torque and ``least_nm``: where the angle
+    steps, an error of the torque cannot move it by more than the step.
     """
-    run = np.abs(np.gradient(torque_nm))
-    # A rough torque may stand still in most of the blocks.
-    typical = max(np.median(run), 0.1 * np.mean(run))
-    return np.abs(np.gradient(angle_rad)) / np.maximum(run, least * typical + 1e-300)
+    least = np.sqrt(blocks.torque_variance_nm2 + blocks.torque_trend_nm2)
+    least = np.maximum(least, max(least_nm, SHORTEST_RUN * np.ptp(blocks.torque_nm)))
+    slope = np.zeros(blocks.count.size)
+    for k in range(blocks.direction.size):
+        own = np.flatnonzero(blocks.leg == k)
+        torque, angle = blocks.torque_nm[own], np.asarray(angle_rad)[own]
+        near = np.abs(own[:, None] - own) <= 1
+        near |= np.abs(torque[:, None] - torque) <= least[own, None]
+        rise, run = (
+            np.where(near, values, -np.inf).max(axis=1) - np.where(near, values, np.inf).min(axis=1) for values in (angle, torque)
+        )
+        slope[own] = rise / np.maximum(run, least[own])
+    return slope
 
 
 def _path_covariance(blocks, slope):

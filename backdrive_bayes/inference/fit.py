@@ -31,8 +31,6 @@ from backdrive_bayes.records.reduction import reduce_record
 
 BEND_NODES = 8
 """Points within a block at which the model's curvature is averaged."""
-LEAST_STEP = 0.02
-"""Share of a typical step of the torque that counts as the least one where slopes are taken."""
 MOST_BLOCKS = 1200
 """Blocks of all records together beyond which each record gets fewer."""
 BETTER_MODE = 5.0
@@ -120,7 +118,7 @@ def _refine(problem, optimum) -> Prepared:
     problem = replace(problem, misfit=0.0)
     discrepancy = learn_discrepancy(problem, optimum)
     angles = [problem.model.angle(problem.values(optimum.z, r), d.path) for r, d in enumerate(problem.records)]
-    slopes = [local_slope(d.blocks.torque_nm, angle, LEAST_STEP) for d, angle in zip(problem.records, angles, strict=True)]
+    slopes = [local_slope(d.blocks, angle) for d, angle in zip(problem.records, angles, strict=True)]
     noise, path_sd = refine_noise(problem, optimum.z, discrepancy, slopes)
     records = tuple(
         RecordData.prepare(corrected_blocks(problem, optimum.z, r, path_sd), n, s, problem.records[r].path)

@@ -48,7 +48,7 @@ def _identity(saved):
         ("90 % credible set", free(", ".join(label_words(e) for e in saved.credible_set) or "not given")),
     ]
     if saved.shrink:
-        rows.append(("Held out", free(saved.shrink.get("held_out") or "not recorded")))
+        rows.append(("Held out", free(tables.held_out_text(saved))))
     level = level_text(saved.level)
     return Facts([*rows, ("Intervals", f"central {level} credible intervals, written median [low, high]")])
 

@@ -39,7 +39,14 @@ def gap_text(saved: Diagnosed) -> str:
     if not gap:
         return "not judged"
     size = f"rms {_arcmin(gap.get('rms_rad'))} arcmin, noise floor {_arcmin(gap.get('noise_floor_rad'))} arcmin"
-    return f"probability {probability_text(gap.get('probability'))}; {size}"
+    return f"probability {probability_text(gap.get('probability'))}; as fitted to all records: {size}"
+
+
+def held_out_text(saved: Diagnosed) -> str:
+    """What is left out and its rms before and after."""
+    found = saved.shrink
+    before, after, floor = (_arcmin(found.get(k)) for k in ("before_rad", "after_rad", "noise_floor_rad"))
+    return f"{found.get('held_out') or 'not recorded'}: rms {before} arcmin before, {after} after, noise floor {floor} arcmin"
 
 
 def probabilities(saved: Diagnosed) -> list:
@@ -89,8 +96,8 @@ def shrink(saved: Diagnosed) -> list:
         lines.append(["Gaussian process (control)", "–", "–", "–", share_text(control)])
     columns = ["Held out", "before [arcmin]", "after [arcmin]", "noise floor [arcmin]", "closed fraction"]
     note = Note(
-        "Root mean square of measured minus modelled angle, before and after the effect is added to the model. Closed "
-        f"fraction: median [{level_text(saved.level)} interval]."
+        "Root mean square of measured minus predicted angle of what the fit has not seen, before and after the effect is added "
+        f"to the model. Closed fraction with its {level_text(saved.level)} interval, by a Bayesian bootstrap over half legs."
     )
     return [Table(columns, lines, [1.5, 1, 1, 1.2, 1.3]), note]
 
@@ -106,9 +113,11 @@ def indicators(saved: Diagnosed) -> list:
             lines.append([name, unit, *texts, _change(before, after, factor)])
     if not lines:
         return []
+    at = saved.shrink.get("indicators_at")
+    where = f" at {at['loading_rate_Nm_per_s']:.3g} N·m/s and ±{at['amplitude_Nm']:.3g} N·m" if at else ""
     note = Note(
-        f"Median [{level_text(saved.level)} interval] of the reducer without and with the effect in the model; the change is "
-        "that of the median."
+        f"Median [{level_text(saved.level)} interval] of the reducer{where}, without and with the effect in the model; the "
+        "change is that of the median."
     )
     return [Table(["Indicator", "Unit", "Before", "After", "Change"], lines, [1.6, 0.6, 1.3, 1.3, 0.7]), note]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, share_text
+from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, more_words, share_text
 from backdrive_bayes.figures.style import in_words
 from backdrive_bayes.report.blocks import Facts, Paragraph
 from backdrive_bayes.report.numbers import significant
@@ -34,9 +34,22 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
         return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))
     rivals = _rivals(saved)
     found = "GAP FOUND" if "none" not in saved.credible_set else "GAP PROBABLE"
-    named = f"{found}, CAUSES STILL CONFUSABLE" if rivals else f"{found}, CAUSE NAMED"
-    title = "GAP OF UNKNOWN CAUSE" if saved.effects == ["unknown"] else named
-    return "caution", title, Free(_join(answer_words(saved), where, rivals, _closed(saved)))
+    text = Free(_join(answer_words(saved), more_words(saved), where, rivals, _closed(saved)))
+    if saved.effects == ["unknown"]:
+        return "caution", "GAP OF UNKNOWN CAUSE", text
+    return "caution", f"{found}, {_standing(saved, rivals)}", text
+
+
+def _standing(saved, rivals):
+    if rivals:
+        return "CAUSES STILL CONFUSABLE"
+    return "CAUSE NAMED" if _closes(saved) else "THE NAME IN DOUBT"
+
+
+def _closes(saved):
+    """Whether what is named takes anything off the gap on held-out data, as far as that was judged."""
+    closed = saved.shrink.get("closed_fraction")
+    return not closed or closed["hi"] > 0
 
 
 def _join(*sentences):
@@ -53,7 +66,8 @@ def _closed(saved):
     if not saved.shrink.get("closed_fraction"):
         return ""
     what = "The best listed candidate" if saved.effects == ["unknown"] else "Added to the model, it"
-    return f"{what} closes {share_text(saved.shrink['closed_fraction'])} of the gap on held-out data."
+    closes = f"{what} closes {share_text(saved.shrink['closed_fraction'])} of the gap on held-out data"
+    return closes + ("." if _closes(saved) else ": it foretells nothing of what it is named for.")
 
 
 def next_test(saved: Diagnosed) -> list:

@@ -50,6 +50,12 @@ def test_ratios_are_left_out_where_signs_change():
     assert found["ratio"] is None and found["difference"]["median"] == pytest.approx(-3, abs=0.3)
 
 
+def test_equal_draws_speak_for_neither():
+    """The planted fault: counting only what is strictly greater says of two zeros that the first is surely not greater."""
+    found = contrast(np.zeros(400), np.zeros(400), 0.05, 0.9, RNG(0))
+    assert found["probability_first_greater"] == 0.5 and found["verdict"] == "equivalent"
+
+
 def test_pairing_uses_every_draw_as_often_as_can_be():
     values = paired(np.arange(300.0), RNG(0), 1000)
     counts = np.bincount(values.astype(int), minlength=300)

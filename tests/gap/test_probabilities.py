@@ -10,7 +10,15 @@ import pytest
 from backdrive_bayes.gap.candidates import MISFIT_LEVELS, UNKNOWN_KINDS, UNKNOWN_LEVELS
 from backdrive_bayes.gap.evidence import FORMULA_ERRORS
 from backdrive_bayes.gap.fast import Fast
-from backdrive_bayes.gap.probabilities import CALIBRATION, Evidences, credible_set, marginal, probabilities
+from backdrive_bayes.gap.probabilities import (
+    CALIBRATION,
+    Evidences,
+    credible_set,
+    lasting,
+    marginal,
+    probabilities,
+    unexplained_beside,
+)
 
 QUIET = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": -3.0}, {})
 LEVELS = -np.geomspace(1.0, 400.0, len(MISFIT_LEVELS))[:, None] + np.zeros(len(FORMULA_ERRORS))
@@ -59,6 +67,29 @@ def test_a_module_that_every_reducer_has_comes_first():
     named = labels(candidates(geometric=60.0, sensor_lag=65.0))
     assert named["geometric"] > 3 * named["sensor_lag"]
     assert labels(candidates(geometric=60.0, sensor_lag=160.0))["sensor_lag"] > 0.9
+
+
+def test_something_unknown_beside_a_module_leaves_the_module_named():
+    """An effect beside which something unknown acts is unknown as a whole: only modules are known to be there."""
+    both = (candidates(**{name: 100.0}, beside=80.0) for name in ("geometric", "sensor_lag"))
+    beside = [probabilities(Evidences.of(found, QUIET)) for found in both]
+    module, effect = (marginal(joint) for joint in beside)
+    assert module["geometric"] > 0.9 and "geometric+unknown" not in module and sum(module.values()) == pytest.approx(1.0)
+    assert effect["unknown"] > 0.9
+    assert unexplained_beside(beside[0], ("geometric",)) > 0.9
+    alone = probabilities(Evidences.of(candidates(geometric=100.0, beside=-30.0), QUIET))
+    assert unexplained_beside(alone, ("geometric",)) < 0.1
+    hum = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": 80.0}, {})
+    assert unexplained_beside(probabilities(Evidences.of(candidates(geometric=100.0, beside=-30.0), hum)), ("geometric",)) > 0.9
+
+
+def test_what_a_search_still_gained_counts_by_temperature_and_odds():
+    close, clear = candidates(sensor_lag=400.0, thermal_drift=399.0), candidates(sensor_lag=400.0, thermal_drift=300.0)
+    close, clear = (Evidences.of(found, QUIET) for found in (close, clear))
+    assert lasting(close, 0.0) and lasting(close, 10.0) and not lasting(close, 15.0)
+    assert lasting(clear, 15.0) and not lasting(clear, 60.0)
+    weak = Evidences.of(candidates(sensor_lag=1.0, thermal_drift=0.0), QUIET)
+    assert lasting(weak, 2.0) and not lasting(weak, 6.0)
 
 
 def test_a_pair_must_earn_its_place():

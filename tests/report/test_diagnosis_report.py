@@ -36,7 +36,8 @@ def test_the_first_page_is_verdict_place_and_overview(made):
         "78 % of the gap lies on the loading branches",
         "Not ruled out at 90 %: second backlash",
         "closes 91 % [88, 95] of the gap",
-        "probability 0.998; rms 1.24 arcmin, noise floor 0.107 arcmin",
+        "probability 0.998; as fitted to all records: rms 1.24 arcmin, noise floor 0.107 arcmin",
+        "records left out in turn: rms 1.24 arcmin before, 0.179 after, noise floor 0.107 arcmin",
         "interface slip, second backlash",
         "Which effect?",
         "Signature",
@@ -77,7 +78,7 @@ def test_saved_sentences_are_said_in_words(tmp_path):
 
 def test_tables_name_the_level_of_their_intervals(made):
     text = " ".join(made[1])
-    for words in ("Median [90 % interval] Unit", "Closed fraction: median [90 % interval]", "[90 % interval] without and with"):
+    for words in ("Median [90 % interval] Unit", "Closed fraction with its 90 % interval", "[90 % interval] without and with"):
         assert words in text
     assert "median and 90 % interval of each record" in text
 
@@ -102,6 +103,23 @@ def test_a_gap_that_is_not_there(tmp_path):
     pages, _ = pages_of(tmp_path)
     assert "NO GAP" in pages[0] and "none (no gap)" in pages[0] and "Not ruled out" not in pages[0]
     assert not any("How far it shrinks" in p or "Next test" in p or "What it changes" in p for p in pages)
+
+
+def test_a_name_that_foretells_nothing_is_doubted(tmp_path):
+    result = write_diagnosis(tmp_path, 1)
+    for hi, title in ((-0.1, "THE NAME IN DOUBT"), (0.2, "CAUSE NAMED")):
+        shrink = result["shrink"] | {"closed_fraction": {"median": -0.4, "lo": -0.8, "hi": hi}}
+        write_diagnosis(tmp_path, 1, shrink=shrink, answer={"effects": ["interface_slip"], "credible_set_90": ["interface_slip"]})
+        pages, _ = pages_of(tmp_path)
+        assert title in pages[0] and ("foretells nothing" in pages[0]) == (hi < 0)
+
+
+def test_what_acts_beside_a_named_module_is_told(tmp_path):
+    which = [{"effect": "geometric", "probability": 0.96}, {"effect": "unknown", "probability": 0.04}]
+    answer = {"effects": ["geometric"], "credible_set_90": ["geometric"], "probability_of_more": 0.98}
+    write_diagnosis(tmp_path, 1, which=which, answer=answer)
+    pages, _ = pages_of(tmp_path)
+    assert "Something that is not listed acts beside it (98 %)" in pages[0]
 
 
 def test_an_unknown_cause_credits_nothing_to_a_name(tmp_path):

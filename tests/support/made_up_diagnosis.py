@@ -123,6 +123,7 @@ def _shrink(files):
             for i, f in enumerate(files)
         ],
         "gaussian_process": {"closed_fraction": interval(0.71, 0.12)},
+        "indicators_at": {"file": files[0], "loading_rate_Nm_per_s": 0.05, "amplitude_Nm": 3.0},
         "indicators": {
             "lost_motion_rad": {"before": interval(2.61e-3, 7e-5), "after": interval(2.48e-3, 3e-5)},
             "loop_area_J": {"before": interval(4.91e-3, 9e-5), "after": interval(4.37e-3, 4e-5)},
