@@ -61,15 +61,14 @@ def _record_list(saved):
 
 
 def _details(saved, figures) -> list[Block]:
-    def pictures(kind, floats=True):
-        return [Picture(n, caption(n, saved.level), floats) for n in figures if n == kind or n.startswith(f"{kind}-")]
+    def pictures(kind):
+        return [Picture(n, caption(n, saved.level)) for n in figures if n == kind or n.startswith(f"{kind}-")]
 
-    told = bool(saved.summary)
     parts = (
         ("Which effect", [*tables.probabilities(saved), *tables.effect_parameters(saved)]),
-        ("Where the gap lies", [*_summary(saved), *(p for k in ("gap-map", "gap-residual") for p in pictures(k, told))]),
+        ("Where the gap lies", [*_summary(saved), *pictures("gap-map"), *pictures("gap-residual")]),
         ("How far it shrinks", [*tables.shrink(saved), *pictures("closed-fraction")]),
-        ("What it changes", [*tables.indicators(saved), *pictures("parameter-shift"), *tables.parameter_shift(saved)]),
+        ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved), *pictures("parameter-shift")]),
         ("Next test", next_test(saved)),
         ("Convergence", tables.convergence(saved)),
         ("Terms", [Facts(TERMS)] if saved.result["which"] else []),

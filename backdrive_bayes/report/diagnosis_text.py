@@ -11,7 +11,7 @@ from backdrive_bayes.report.text import Free, free
 
 TERMS = [
     ("Gap", "what the baseline leaves of the measured angle beyond the noise and beyond its own small misfit"),
-    ("Noise floor", "rms that noise alone would leave; from replicate cycles where there are any"),
+    ("Noise floor", "rms that the noise of the measured angle and torque alone would leave"),
     ("Probability", "posterior probability of each hypothesis, the baseline's parameters re-fitted with each"),
     ("unknown", "something is missing in the model, and no effect in the list explains it"),
     ("none", "the baseline explains the data to the noise"),

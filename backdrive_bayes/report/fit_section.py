@@ -25,7 +25,7 @@ from backdrive_bayes.report.text import free, short_digest
 
 ON_SUMMARY = 2 * PER_FIGURE
 """Records whose indicators fit on the summary page."""
-IN_PLACE = ("loop", "modules", "torque-energy")
+IN_PLACE = ("loop", "modules", "torque-energy", "corner")
 """Figures that stand where they are called for; those behind them let text go first and so keep their order."""
 
 
@@ -98,7 +98,7 @@ def _details(saved, figures) -> list[Block]:
         names = [n for n in figures if n == kind or n.startswith(f"{kind}-")]
         return [Picture(n, caption(n, level), floats=kind not in IN_PLACE) for n in names]
 
-    loops = pictures("loop")
+    loops, corners = pictures("loop"), pictures("corner")
     more = tables.indicators(saved) if len(saved.records) > ON_SUMMARY else []
     return [
         *([Heading("Loops"), *loops] if loops else []),
@@ -117,12 +117,12 @@ def _details(saved, figures) -> list[Block]:
         *tables.convergence(saved),
         *pictures("trace"),
         *pictures("predictive"),
-        *pictures("corner"),
         Heading("Parameters and priors"),
         *parameters(saved),
         *tables.noise(saved),
         *least_squares(saved),
         *_reproduction(saved),
+        *([Heading("Pairs of parameters"), *corners] if corners else []),
     ]
 
 
