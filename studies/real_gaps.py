@@ -2,10 +2,11 @@
 
     python studies/real_gaps.py --data ../shared/data/cycloidal --workers 2 --out reports/real-gaps
 
-Geometric error is withheld, then friction: the answer should hold it. With the whole baseline nobody knows the answer. Written:
-real_gaps.json, one entry a unit and baseline as it is found (those there are left alone), and how often what was withheld was
-named. Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not
-copied.
+Geometric error is withheld, then friction: the answer should hold it. With the whole baseline nobody knows the answer; beside it
+stands how much of what it leaves comes again in replicate loops. Written: real_gaps.json, one entry a unit and baseline as it is
+found (those there are left alone), how often what was withheld was named, and the replicates.
+
+Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
+import itertools
 import json
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import numpy as np
+
 from backdrive_bayes.gap.diagnose import diagnose
+from backdrive_bayes.gap.setting import Setting
 from backdrive_bayes.model.registry import BASELINE
 from backdrive_bayes.records.unit_folder import read_unit
 
@@ -41,8 +46,41 @@ def study(job) -> dict:
         "probabilities": {row["effect"]: round(row["probability"], 4) for row in found["which"][:5]},
         "probability_of_withheld": sum(r["probability"] for r in found["which"] if withheld in r["effect"].split("+")),
         "where": found["where"]["summary"], "closed_fraction": shrink["closed_fraction"],
+        "probability_of_more": found["answer"].get("probability_of_more"),
         "control": shrink["gaussian_process"]["closed_fraction"],
         **{key: shrink[key] for key in ("before_rad", "after_rad", "noise_floor_rad")}, "seconds": round(found["seconds"], 1),
+    }  # fmt: skip
+
+
+def replicates(folder) -> dict:
+    """What the whole baseline leaves of the loops after the first of their size, and how much two of them differ in it [rad].
+
+    Two residuals of the same leg are compared at the same torques, their offset taken out; half the mean square of the difference
+    is what does not come again.
+    """
+    unit = read_unit(folder)
+    setting = Setting.of(unit, np.random.default_rng(0), BASELINE)
+    problem, alike = setting.problem, setting.places.same_loop
+    curves = []
+    for r, data in enumerate(problem.records):
+        residual = data.blocks.angle_rad - problem.model.angle(problem.values(setting.z, r), data.path)
+        legs = [data.blocks.leg == k for k in range(1, data.blocks.direction.size)]
+        curves.append([(data.blocks.torque_nm[own], residual[own]) for own in legs])
+    later = [r for r in range(len(curves)) if alike[r, :r].any()]
+    squares, differences = [], []
+    for i, j in itertools.combinations(later, 2):
+        if not alike[i, j] or len(curves[i]) != len(curves[j]):
+            continue
+        for (torque, one), (other_torque, other) in zip(curves[i], curves[j], strict=True):
+            order = np.argsort(other_torque)
+            difference = one - np.interp(torque, other_torque[order], other[order])
+            span = np.abs(np.gradient(torque))
+            squares.append(np.average((one - np.average(one, weights=span)) ** 2, weights=span))
+            differences.append(0.5 * np.average((difference - np.average(difference, weights=span)) ** 2, weights=span))
+    left, apart = np.mean(squares), np.mean(differences)
+    return {
+        "unit": unit.name, "left_rad": float(np.sqrt(left)), "not_repeated_rad": float(np.sqrt(apart)),
+        "repeated_share": float(1 - apart / left), "noise_floor_rad": setting.noise_rad,
     }  # fmt: skip
 
 
@@ -73,11 +111,14 @@ def main():
     with ProcessPoolExecutor(options.workers) as pool:
         for result in pool.map(study, jobs):
             found.append(result)
-            kept = {"credit": CREDIT, "named": [named(found, module) for module in WITHHELD[:-1]], "diagnoses": found}
+            kept |= {"credit": CREDIT, "named": [named(found, module) for module in WITHHELD[:-1]], "diagnoses": found}
             path.write_text(json.dumps(kept, indent=1))
             print(*(result[k] for k in ("unit", "withheld", "answer", "probabilities", "where", "seconds")), flush=True)
-    for counts in kept["named"]:
-        print(counts)
+        if "replicates" not in kept:
+            kept["replicates"] = list(pool.map(replicates, folders))
+            path.write_text(json.dumps(kept, indent=1))
+    for line in (*kept["named"], *kept["replicates"]):
+        print(line)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,13 @@
 
 import json
 
+import numpy as np
 import pytest
 from support.bench import unit_of
 from support.known import RATED, SCALE
 
-from backdrive_bayes.indicators.summary import indicators_json
+from backdrive_bayes.indicators.loop import Loops
+from backdrive_bayes.indicators.summary import _loop_json, indicators_json
 from backdrive_bayes.inference.fit import fit
 from backdrive_bayes.inference.sampling import Settings
 
@@ -76,3 +78,13 @@ def test_two_loops_of_one_unit_agree_where_they_meet(result):
     at_half = large["by_amplitude"]["loop_area_J"][4]
     assert large["by_amplitude"]["amplitude_Nm"][4] == pytest.approx(small["amplitude_Nm"], rel=0.01)
     assert at_half["median"] == pytest.approx(small["indicators"]["loop_area_J"]["median"], rel=0.1)
+
+
+def test_bands_of_a_loop_are_those_of_its_shape():
+    """The planted fault: loops that differ in nothing but the encoder's zero would have a band as wide as that."""
+    torque, zero = np.linspace(-1.0, 1.0, 21), np.random.default_rng(0).normal(0.0, 1e-2, (300, 1))
+    found = _loop_json(Loops(torque, zero + 1e-3 * torque, zero + 1e-3 * torque + 2e-4), 0.9)
+    for branch, angle in (("rising_rad", 1e-3 * torque), ("falling_rad", 1e-3 * torque + 2e-4)):
+        band = {k: np.array(v) for k, v in found[branch].items()}
+        assert np.ptp(band["hi"] - band["lo"]) < 1e-12 and np.max(band["hi"] - band["lo"]) < 1e-12
+        np.testing.assert_allclose(band["median"] - band["median"].mean(), angle - angle.mean(), atol=1e-12)
