@@ -17,8 +17,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-import functools
-import hashlib
 import json
 import time
 import warnings
@@ -27,8 +25,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+from code_hash import code_hash
 
-import backdrive_bayes
 from backdrive_bayes.bench.unit import draw_unit
 from backdrive_bayes.blind.calibration import calibration
 from backdrive_bayes.blind.key import label_of
@@ -48,13 +46,9 @@ DIRT = (0.5, 3.0)
 """Level of the small faults that every bench has, from cleaner than usual to dirtier."""
 
 
-@functools.cache
 def fingerprint() -> str:
     """Hash of the code that the evidences come from; what turns them into probabilities is not part of it."""
-    package = Path(backdrive_bayes.__file__).parent
-    parts = ("bench", "blind", "gap", "inference", "model", "records")
-    files = sorted(p for part in parts for p in (package / part).rglob("*.py"))
-    return hashlib.sha256(b"".join(p.read_bytes() for p in files if p.name not in WEIGHED_LATER)).hexdigest()[:12]
+    return code_hash(("bench", "blind", "gap", "inference", "model", "records"), WEIGHED_LATER)
 
 
 def weigh(job) -> dict:
@@ -68,7 +62,7 @@ def weigh(job) -> dict:
     truth = label_of(bench.truth.answer)
     allowed = [name for name in CANDIDATES if name != truth] if removed else None
     candidates = weigh_all(setting, rng, allowed=allowed)
-    fast = weigh_fast(setting, candidates).within(allowed)
+    fast, candidates = weigh_fast(setting, candidates)
     planted = [
         {"name": p.name, "severity": p.severity, "height": round(p.height, 2), "limited": bool(p.limited)}
         for p in bench.truth.planted
@@ -76,7 +70,7 @@ def weigh(job) -> dict:
     return {
         "index": index, "removed": removed, "truth": UNKNOWN if removed else truth,
         "severity": min(effects.values(), default=None), "planted": planted, "code": code,
-        "evidences": Evidences.of(candidates, fast).as_json(), "seconds": time.perf_counter() - began,
+        "evidences": Evidences.of(candidates, fast.within(allowed)).as_json(), "seconds": time.perf_counter() - began,
     }  # fmt: skip
 
 

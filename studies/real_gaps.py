@@ -4,7 +4,7 @@
 
 Geometric error is withheld, then friction: the answer should hold it. With the whole baseline nobody knows the answer; beside it
 stands how much of what it leaves comes again in replicate loops. Written: real_gaps.json, one entry a unit and baseline as it is
-found (those there are left alone), how often what was withheld was named, and the replicates.
+found (those there of the same code are left alone, others made anew), how often what was withheld was named, and the replicates.
 
 Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
 """
@@ -23,6 +23,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from code_hash import code_hash
 
 from backdrive_bayes.gap.diagnose import diagnose
 from backdrive_bayes.gap.setting import Setting
@@ -30,6 +31,7 @@ from backdrive_bayes.model.registry import BASELINE
 from backdrive_bayes.records.unit_folder import read_unit
 
 CREDIT = "github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0"
+CODE = code_hash(("gap", "inference", "model", "records"))
 WITHHELD = ("geometric", "friction", None)
 
 
@@ -46,18 +48,19 @@ def study(job) -> dict:
         "probabilities": {row["effect"]: round(row["probability"], 4) for row in found["which"][:5]},
         "probability_of_withheld": sum(r["probability"] for r in found["which"] if withheld in r["effect"].split("+")),
         "where": found["where"]["summary"], "closed_fraction": shrink["closed_fraction"],
-        "probability_of_more": found["answer"].get("probability_of_more"),
+        "unlisted_probability": found["gap"]["unlisted_probability"], "code": CODE,
         "control": shrink["gaussian_process"]["closed_fraction"],
         **{key: shrink[key] for key in ("before_rad", "after_rad", "noise_floor_rad")}, "seconds": round(found["seconds"], 1),
     }  # fmt: skip
 
 
-def replicates(folder) -> dict:
+def replicates(folder) -> dict | None:
     """What the whole baseline leaves of the loops after the first of their size, and how much two of them differ in it [rad].
 
     Two residuals of the same leg are compared at the same torques, their offset taken out; half the mean square of the difference
-    is what does not come again.
+    is what does not come again. None where no two loops are alike.
     """
+    warnings.simplefilter("ignore")
     unit = read_unit(folder)
     setting = Setting.of(unit, np.random.default_rng(0), BASELINE)
     problem, alike = setting.problem, setting.places.same_loop
@@ -68,20 +71,25 @@ def replicates(folder) -> dict:
         curves.append([(data.blocks.torque_nm[own], residual[own]) for own in legs])
     later = [r for r in range(len(curves)) if alike[r, :r].any()]
     squares, differences = [], []
-    for i, j in itertools.combinations(later, 2):
+    for i, j in itertools.permutations(later, 2):
         if not alike[i, j] or len(curves[i]) != len(curves[j]):
             continue
         for (torque, one), (other_torque, other) in zip(curves[i], curves[j], strict=True):
             order = np.argsort(other_torque)
-            difference = one - np.interp(torque, other_torque[order], other[order])
             span = np.abs(np.gradient(torque))
-            squares.append(np.average((one - np.average(one, weights=span)) ** 2, weights=span))
-            differences.append(0.5 * np.average((difference - np.average(difference, weights=span)) ** 2, weights=span))
+            squares.append(_spread(one, span))
+            differences.append(0.5 * _spread(one - np.interp(torque, other_torque[order], other[order]), span))
+    if not squares:
+        return None
     left, apart = np.mean(squares), np.mean(differences)
     return {
         "unit": unit.name, "left_rad": float(np.sqrt(left)), "not_repeated_rad": float(np.sqrt(apart)),
-        "repeated_share": float(1 - apart / left), "noise_floor_rad": setting.noise_rad,
+        "repeated_share": float(1 - apart / left), "median_noise_rad": setting.noise_rad, "code": CODE,
     }  # fmt: skip
+
+
+def _spread(values, weights):
+    return np.average((values - np.average(values, weights=weights)) ** 2, weights=weights)
 
 
 def named(found, withheld) -> dict:
@@ -104,20 +112,24 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     folders = sorted(p.parent for p in options.data.glob("*/unit.toml"))
     path = options.out / "real_gaps.json"
-    kept = json.loads(path.read_text()) if path.exists() else {"diagnoses": [], "named": []}
-    found = kept["diagnoses"]
-    done = {(r["unit"], r["withheld"]) for r in found}
+    kept = json.loads(path.read_text()) if path.exists() else {}
+    found, again = ([row for row in kept.get(part, []) if row["code"] == CODE] for part in ("diagnoses", "replicates"))
+    done = {(row["unit"], row["withheld"]) for row in found}
     jobs = [(folder, withheld) for withheld in WITHHELD for folder in folders if (folder.name, withheld) not in done]
+
+    def write():
+        counts = [named(found, module) for module in WITHHELD[:-1]]
+        path.write_text(json.dumps({"credit": CREDIT, "named": counts, "diagnoses": found, "replicates": again}, indent=1))
+        return counts
+
     with ProcessPoolExecutor(options.workers) as pool:
         for result in pool.map(study, jobs):
             found.append(result)
-            kept |= {"credit": CREDIT, "named": [named(found, module) for module in WITHHELD[:-1]], "diagnoses": found}
-            path.write_text(json.dumps(kept, indent=1))
+            write()
             print(*(result[k] for k in ("unit", "withheld", "answer", "probabilities", "where", "seconds")), flush=True)
-        if "replicates" not in kept:
-            kept["replicates"] = list(pool.map(replicates, folders))
-            path.write_text(json.dumps(kept, indent=1))
-    for line in (*kept["named"], *kept["replicates"]):
+        known = {row["unit"] for row in again}
+        again += [row for row in pool.map(replicates, [f for f in folders if f.name not in known]) if row]
+    for line in (*write(), *again):
         print(line)
 
 

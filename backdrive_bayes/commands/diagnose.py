@@ -45,8 +45,8 @@ def _summarise(result: dict, out: Path) -> None:
         say(f"{result['unit']}: gap with probability {result['gap']['probability']:.2f}; {top}")
         named, chosen = " + ".join(result["answer"]["effects"]) or "none", ", ".join(result["answer"]["credible_set_90"])
         say(f"  answer: {named}; 90 % set: {chosen}")
-        if "probability_of_more" in result["answer"]:
-            say(f"  something that is not listed acts beside it with probability {result['answer']['probability_of_more']:.2f}")
+        if named != "unknown":
+            say(f"  something that is not listed acts with probability {result['gap']['unlisted_probability']:.2f}")
         say(f"  where: {result['where']['summary']}")
         closed = result["shrink"]["closed_fraction"]
         say(f"  closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")

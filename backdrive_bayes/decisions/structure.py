@@ -11,6 +11,7 @@ from backdrive_bayes.errors import BadInput
 
 SMALL = 1e-3
 """A probability that is not worth a word."""
+NO_VERDICT = "inconclusive diagnosis"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +85,16 @@ def _uncovered(diagnosis, held: set[str]) -> dict[str, float]:
     try:
         found = {str(w["effect"]): float(w["probability"]) for w in diagnosis["which"]}
         answer = [str(name) for name in diagnosis["answer"]["effects"]]
-        more = float(diagnosis["answer"].get("probability_of_more", 0.0))
+        # What acts unlisted beside a named module is held by no model either.
+        unlisted = float((diagnosis.get("gap") or {}).get("unlisted_probability", 0.0))
     except (KeyError, TypeError, ValueError) as error:
         wanted = "which[].effect, which[].probability and answer.effects"
         raise BadInput("diagnosis.json", wanted, f"{type(error).__name__} {error}") from None
-    if not all(np.isfinite(p) and 0 <= p <= 1 for p in found.values()):
-        raise BadInput("diagnosis.json", "probabilities between 0 and 1", str(found)[:80])
-    # What acts beside a named module is held by no model.
-    found["unknown"] = max(found.get("unknown", 0.0), more)
-    out = {name: p for name, p in found.items() if name != "none" and name not in held and p > SMALL}
+    if not all(np.isfinite(p) and 0 <= p <= 1 + 1e-9 for p in (*found.values(), unlisted)):
+        raise BadInput("diagnosis.json", "probabilities between 0 and 1", str(found | {"unlisted": unlisted})[:80])
+    found["unknown"] = max(found.get("unknown", 0.0), unlisted)
+    out = {name: p for name, p in found.items() if name != "none" and not set(name.split("+")) <= held and p > SMALL}
+    if diagnosis.get("inconclusive"):
+        out[NO_VERDICT] = 0.5
     # What a diagnosis answers with acts, whatever the rounding of its single probabilities.
     return out | {name: max(0.5, out.get(name, 0.0)) for name in answer if name not in held and name != "none"}

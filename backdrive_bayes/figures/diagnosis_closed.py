@@ -17,7 +17,7 @@ from backdrive_bayes.figures.style import (
 )
 
 CAPTION = (
-    "Closed fraction of the gap on held-out data: median and interval of each record and of all of them, with "
+    "Closed fraction of the gap on held-out data: value and interval of each record and of all of them, with "
     "the named effect added to the model. Beneath, as a control, a Gaussian process that may bend anywhere: it "
     "closes a gap too, but names no cause. Below zero: worse than before."
 )

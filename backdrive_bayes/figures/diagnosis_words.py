@@ -90,11 +90,12 @@ def answer_words(saved: Diagnosed) -> str:
 
 
 def more_words(saved: Diagnosed) -> str:
-    """That something else acts beside the modules that are named, where that is likely; else empty."""
-    probability = saved.result["answer"].get("probability_of_more") or 0.0
-    if saved.inconclusive or probability < WORTH_A_WORD:
+    """That something unlisted acts beside the modules that are named, where that is likely; else empty."""
+    alone = sum(e["probability"] for e in saved.hypotheses if e["effect"] == "unknown")
+    beside = (saved.gap.get("unlisted_probability") or 0.0) - alone
+    if saved.inconclusive or not saved.effects or beside < WORTH_A_WORD:
         return ""
-    return f"Something that is not listed acts beside it ({chance(probability)})."
+    return f"Something that is not listed acts beside it ({chance(beside)})."
 
 
 def _probability(saved, effect):

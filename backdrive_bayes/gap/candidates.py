@@ -7,7 +7,7 @@ of them are then fitted in full.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -59,17 +59,23 @@ class Candidates:
     """Every hypothesis weighed.
 
     ``unexplained`` holds the log evidences (kinds, levels, errors) of structure beside the baseline and the best hypotheses.
-    ``regained`` is the log posterior by which the last fresh search for the best one's mode still beat it, 0 where it came back.
+    ``regained`` is the log posterior by which the last fresh search still beat the mode of ``sought``, the best one then.
     """
 
     weighed: tuple[Weighed, ...]
     unexplained: dict[tuple[str, ...], np.ndarray]
     regained: float = 0.0
+    sought: tuple[str, ...] = ()
 
     @property
     def best(self) -> Weighed:
         """The hypothesis of the highest evidence under any misfit."""
         return max(self.weighed, key=lambda w: w.height)
+
+    def without(self, effect: str) -> Candidates:
+        """The same less all hypotheses that hold an effect."""
+        unexplained = {effects: values for effects, values in self.unexplained.items() if effect not in effects}
+        return replace(self, weighed=tuple(w for w in self.weighed if effect not in w.effects), unexplained=unexplained)
 
     @property
     def none(self) -> Weighed:
@@ -97,10 +103,10 @@ def weigh_all(setting: Setting, rng, note=lambda text: None, allowed=None) -> Ca
     for module in (n for n in names if n in BASELINE):
         note(f"{module} beside the best without it")
         weighed = _completed(setting, weighed, module, rng)
-    weighed, regained = _settle(setting, _polish_best(setting, weighed, rng), rng)
+    weighed, *search = _settle(setting, _polish_best(setting, weighed, rng), rng)
     note("what nothing explains")
     doubted = [weighed[0], *sorted(weighed[1:], key=lambda w: -w.height)[:DOUBTED]]
-    return Candidates(tuple(weighed), {w.effects: _unexplained(setting, w.fitted) for w in doubted}, regained)
+    return Candidates(tuple(weighed), {w.effects: _unexplained(setting, w.fitted) for w in doubted}, *search)
 
 
 def _completed(setting, weighed, module, rng):
@@ -136,28 +142,28 @@ def _polish_best(setting, weighed, rng):
 
 
 def _settle(setting, weighed, rng):
-    """The best hypothesis searched anew until that finds nothing that could matter; and what the last search still gained.
+    """The best hypothesis searched anew until that finds nothing that could matter; what the last search gained, and of which.
 
     What a search still gains might be gained for the next best as well: half the lead is enough. Where the best one gained, the
     next best are searched anew too.
     """
-    table, regained, searched = {w.effects: w for w in weighed}, 0.0, False
+    table, searched = {w.effects: w for w in weighed}, False
     for _ in range(SEARCHES):
         best, *others = sorted(table.values(), key=lambda w: -w.height)
         lead = best.height - others[0].height if others else 0.0
         again = polished(best.fitted, rng)
         before, after = best.fitted.problem.log_posterior(np.array([best.fitted.z, again.z]))
-        regained = float(after - before)
-        if regained <= max(SETTLED, 0.5 * lead):
-            regained = 0.0
+        table[best.effects] = _better(best, _weigh(setting, again))
+        if after <= before + max(SETTLED, 0.5 * lead):
             break
-        table[best.effects], searched = _better(best, _weigh(setting, again)), True
+        searched = True
+    sought = best.effects
     if searched:
         best, *others = sorted(table.values(), key=lambda w: -w.height)
         for other in (w for w in others[:POLISHED] if w.effects):
             for again in (rebased(other.fitted, best.fitted), polished(other.fitted, rng)):
                 table[other.effects] = _better(table[other.effects], _weigh(setting, again))
-    return [table[w.effects] for w in weighed], regained
+    return [table[w.effects] for w in weighed], max(float(after - before), 0.0), sought
 
 
 def _better(one, other):

@@ -11,8 +11,8 @@ from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.gap import draws, next_test, where
 from backdrive_bayes.gap.candidates import REFERENCE, Candidates, Weighed, weigh_all
-from backdrive_bayes.gap.fast import Fast, weigh_fast
-from backdrive_bayes.gap.probabilities import Evidences, credible_set, lasting, marginal, probabilities, unexplained_beside
+from backdrive_bayes.gap.fast import weigh_fast
+from backdrive_bayes.gap.probabilities import Evidences, credible_set, lasting, marginal, probabilities, unlisted
 from backdrive_bayes.gap.setting import Setting
 from backdrive_bayes.gap.shrink import shrink
 from backdrive_bayes.indicators.summary import loading_rate_nm_per_s
@@ -57,15 +57,15 @@ def _diagnose(unit, baseline, seed, allowed, k, progress):
     setting = Setting.of(unit, rng, baseline)
     candidates = weigh_all(setting, rng, progress, allowed)
     progress("looking for jumps, vibration and encoder error")
-    fast = weigh_fast(setting, candidates).within(allowed)
-    evidences = Evidences.of(candidates, fast)
+    fast, candidates = weigh_fast(setting, candidates)
+    evidences = Evidences.of(candidates, fast.within(allowed))
     joint = probabilities(evidences)
     labels = marginal(joint)
     likeliest = next(iter(labels))
     effects = () if likeliest == "none" else tuple(likeliest.split("+"))
     progress("where, and how far it shrinks")
     inconclusive = _why_inconclusive(unit, candidates, evidences)
-    found = _Found(setting, candidates, fast, labels, effects, unexplained_beside(joint, effects), inconclusive, rng, k)
+    found = _Found(setting, candidates, labels, effects, unlisted(joint), inconclusive, rng, k)
     result = found.as_json(baseline, allowed)
     result["seconds"] = time.perf_counter() - began
     named = () if effects == ("unknown",) else effects
@@ -78,8 +78,8 @@ def _why_inconclusive(unit, candidates, evidences) -> str:
     if not checked["may_infer"]:
         return checked["reason"]
     if not lasting(evidences, candidates.regained):
-        named = " + ".join(candidates.best.effects) or "the baseline"
-        return f"every fresh search still found a better fit of {named}: run it again with another --seed, or add a record"
+        named = " + ".join(candidates.sought) or "the baseline"
+        return f"the last fresh search still found a better fit of {named}: run it again with another --seed, or add a record"
     return ""
 
 
@@ -87,10 +87,9 @@ def _why_inconclusive(unit, candidates, evidences) -> str:
 class _Found:
     setting: Setting
     candidates: Candidates
-    fast: Fast
     labels: dict
     effects: tuple
-    unexplained: float
+    unlisted: float
     inconclusive: str
     rng: np.random.Generator
     k: float
@@ -144,6 +143,7 @@ class _Found:
         noise = float(weight @ np.diag(self.setting.noise))
         return {
             "probability": float(1 - self.labels.get("none", 0.0)),
+            "unlisted_probability": float(self.unlisted),
             "rms_rad": float(np.sqrt(weight @ gap.mean**2)),
             "noise_floor_rad": float(np.sqrt(noise)),
         }
@@ -165,9 +165,7 @@ class _Found:
     def _answer(self):
         # No name where there is no verdict.
         names = [] if self.inconclusive else list(self.effects)
-        answer = {"effects": names, "credible_set_90": credible_set(self.labels)}
-        held_back = names and all(name in BASELINE for name in names)
-        return answer | ({"probability_of_more": self.unexplained} if held_back else {})
+        return {"effects": names, "credible_set_90": credible_set(self.labels)}
 
     def _shrink(self, none, chosen, gap, z_none, z_chosen):
         found, several = shrink(self.setting, none, chosen.fitted, gap.weight), len(self.setting.problem.records) > 1

@@ -43,22 +43,22 @@ class Fast:
         return replace(self, log_evidence=known | {VIBRATION: max(v for n, v in self.log_evidence.items() if n not in known)})
 
 
-def weigh_fast(setting: Setting, candidates: Candidates) -> Fast:
+def weigh_fast(setting: Setting, candidates: Candidates) -> tuple[Fast, Candidates]:
     """Weigh every kind of fast structure beside the best hypothesis.
 
     An error of the encoder that was fitted to wide blocks may have taken the teeth of stick-slip: where these say more without it
-    than it gained, it is left out.
+    than it gained, the hypotheses that hold it are left out.
     """
     best = candidates.best
     found = _weigh_beside(setting, best.fitted)
     if ENCODER_ERROR in best.effects:
-        other = max((w for w in candidates.weighed if ENCODER_ERROR not in w.effects), key=lambda w: w.height)
-        without = _weigh_beside(setting, other.fitted)
+        rest = candidates.without(ENCODER_ERROR)
+        without = _weigh_beside(setting, rest.best.fitted)
         teeth = without.log_evidence[STICK_SLIP]
-        more = teeth - found.log_evidence[STICK_SLIP] > best.height - other.height
+        more = teeth - found.log_evidence[STICK_SLIP] > best.height - rest.best.height
         if more and teeth > without.log_evidence[ENCODER_ERROR]:
-            return without
-    return found
+            return without, rest
+    return found, candidates
 
 
 def _weigh_beside(setting, fitted):

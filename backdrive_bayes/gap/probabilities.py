@@ -209,10 +209,9 @@ def named_of(effects: tuple[str, ...]) -> tuple[str, ...]:
     return effects[:-1] if len(effects) > 1 and effects[-1:] == UNKNOWN else effects
 
 
-def unexplained_beside(joint: dict[tuple[str, ...], float], effects: tuple[str, ...]) -> float:
-    """Probability that something unknown acts beside the named modules, given that these are the answer."""
-    more, alone = joint.get((*effects, *UNKNOWN), 0.0), joint.get(effects, 0.0)
-    return more / (more + alone) if more + alone > 0 else 0.0
+def unlisted(joint: dict[tuple[str, ...], float]) -> float:
+    """Probability that something unknown acts, alone, instead of what is listed, or beside a named module."""
+    return sum(p for effects, p in joint.items() if effects[-1:] == UNKNOWN)
 
 
 def credible_set(labels: dict[str, float], level: float = 0.9) -> list[str]:

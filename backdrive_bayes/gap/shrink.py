@@ -1,7 +1,8 @@
 """How far the gap shrinks on data left out of the fit once an effect is added, with a flexible control beside it.
 
-Records are left out in turn, or legs where there is one record. What is compared is the prediction by the parameters' mode given
-the rest; the encoder's offset and the past of what is left out are taken from itself, before and after alike.
+Records are left out in turn, or legs where there is one record. What the parameters' mode given the rest foretells is compared,
+without and with the effect. What belongs to a left-out record alone no other tells (the encoder's offset, the loop's past, a
+wave's phase, its own drift): it is fitted to that record under its prior.
 """
 
 from __future__ import annotations
@@ -12,18 +13,21 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 
 from backdrive_bayes.gap.draws import Z_BOUND
-from backdrive_bayes.gap.hypotheses import Fitted, linearised
+from backdrive_bayes.gap.hypotheses import ENOUGH, PROBE, Fitted
 from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
 
-STEPS = 4
+MOST_STEPS = 30
+SHORTENED = np.array([0.0, 0.05, 0.25, 0.5, 1.0])
+"""Lengths at which a Gauss-Newton step is tried."""
 RESAMPLED = 400
+FEWEST_PIECES = 4
 SMALLEST_GAP = 0.2
 MISFIT = ("misfit", MISFIT_LENGTH, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
 class Shrink:
-    """What is left out, piece by piece (half legs), arrays of shape (pieces,).
+    """What is left out, piece by piece (up to four of a leg, by the torque), arrays of shape (pieces,).
 
     ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``, ``control`` and
     ``floor`` are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the control, and noise.
@@ -43,16 +47,23 @@ class Shrink:
         return float(getattr(self, part)[own].sum() / self.share[own].sum())
 
     def closed(self, part: str, rng, level: float, fold: int | None = None) -> dict:
-        """Closed fraction of ``after`` or ``control``, and its central interval where other pieces would have been left out.
+        """Closed fraction of ``after`` or ``control``, and its central interval where other data would have been left out.
 
-        The interval is that of a Bayesian bootstrap over pieces (Rubin, Annals of Statistics 9, 1981).
+        The interval is that of a Bayesian bootstrap over folds and their pieces (Rubin, Annals of Statistics 9, 1981); of fewer
+        than ``FEWEST_PIECES`` pieces there is none: both ends are the value itself.
         """
         own = np.full(self.fold.size, True) if fold is None else self.fold == fold
-        weight = np.concatenate([np.ones((1, own.sum())), rng.standard_exponential((RESAMPLED, own.sum()))])
+        folds, number = np.unique(self.fold[own], return_inverse=True)
+        weight = rng.standard_exponential((RESAMPLED, number.size))
+        if folds.size > 1:
+            weight *= rng.standard_exponential((RESAMPLED, folds.size))[:, number]
+        weight = np.concatenate([np.ones((1, number.size)), weight])
         share = weight @ self.share[own]
         fraction = closed_fraction(*(weight @ getattr(self, name)[own] / share for name in ("before", part, "floor")))
-        lo, hi = np.quantile(fraction, [0.5 - level / 2, 0.5 + level / 2])
         middle = float(fraction[0])
+        if number.size < FEWEST_PIECES:
+            return {"median": middle, "lo": middle, "hi": middle}
+        lo, hi = np.quantile(fraction, [0.5 - level / 2, 0.5 + level / 2])
         return {"median": middle, "lo": min(float(lo), middle), "hi": max(float(hi), middle)}
 
 
@@ -63,7 +74,8 @@ def shrink(setting: Setting, before: Fitted, after: Fitted, weight) -> Shrink:
     columns = []
     for number, own in enumerate(_folds(setting).values()):
         share = weight[own] / weight[own].sum()
-        piece = np.unique(np.stack([setting.places.record[own], leg[own], torque[own] > 0]), axis=1, return_inverse=True)[1]
+        place = np.floor(2 * torque[own] / np.abs(torque[own]).max()).astype(int)
+        piece = np.unique(np.stack([leg[own], place]), axis=1, return_inverse=True)[1]
         squares = (*(_left_out(setting, f, own, share) for f in (before, after)), _control(setting, before, own, share))
         parts = (share, *squares, share * np.diag(setting.noise)[own])
         sums = np.array([np.bincount(piece.ravel(), p) for p in parts])
@@ -82,42 +94,39 @@ def _folds(setting):
 
 
 def _left_out(setting, fitted, own, share):
-    """Squared residual on ``own`` of what the rest predicts, times the blocks' shares, shape (own blocks,)."""
-    mode = _mode(setting, fitted, np.setdiff1d(np.arange(setting.places.record.size), own))
-    nuisance = np.column_stack([np.ones(own.size), mode.jacobian[np.ix_(own, _own_coordinates(setting, mode, own))]])
-    root = np.sqrt(share)
-    basis = np.linalg.qr(nuisance * root[:, None])[0]
-    residual = mode.residual[own] * root
-    return (residual - basis @ (basis.T @ residual)) ** 2
+    """Squared residual on ``own`` of what the rest foretells, times the blocks' shares, shape (own blocks,)."""
+    record, problem = setting.places.record, fitted.problem
+    gone = set(record[own]) - set(record[np.setdiff1d(np.arange(record.size), own)])
+    of_own = np.array([c.record in gone for c in problem.coordinates])
+    z = _climbed(setting, problem, fitted.z, np.flatnonzero(~of_own), np.setdiff1d(np.arange(record.size), own))
+    if of_own.any():
+        z = _climbed(setting, problem, z, np.flatnonzero(of_own), own)
+    residual = problem.raw_residual(z[None])[0, own]
+    return share * (residual - residual @ share) ** 2
 
 
-def _own_coordinates(setting, fitted, own):
-    record = set(setting.places.record[own]) if len(setting.problem.records) > 1 else set()
-    return [i for i, c in enumerate(fitted.problem.coordinates) if c.record in record]
-
-
-def _mode(setting, fitted, rows):
-    """The hypothesis at its mode given some blocks only, by a few Gauss-Newton steps from its joint mode."""
+def _climbed(setting, problem, z, free, rows):
+    """Coordinates at the mode of the ``free`` ones given some blocks only, the others held."""
+    record = setting.places.record[rows]
     lower = cholesky(setting.covariance(MISFIT)[np.ix_(rows, rows)], lower=True)
-    ones = (setting.places.record[rows][:, None] == np.unique(setting.places.record[rows])).astype(float)
-    basis = np.linalg.qr(solve_triangular(lower, ones, lower=True))[0]
+    basis = np.linalg.qr(solve_triangular(lower, (record[:, None] == np.unique(record)).astype(float), lower=True))[0]
 
-    def white(values):
-        values = solve_triangular(lower, values[rows], lower=True)
+    def white(points):
+        values = solve_triangular(lower, problem.raw_residual(points)[:, rows].T, lower=True)
         return values - basis @ (basis.T @ values)
 
-    def cost(z):
-        left = white(fitted.problem.raw_residual(z).T)
-        return np.sum(left**2, axis=0) + np.sum(z**2, axis=1)
-
-    for _ in range(STEPS):
-        residual, jacobian = white(fitted.residual), white(fitted.jacobian)
-        normal = np.eye(fitted.z.size) + jacobian.T @ jacobian
-        step = -np.linalg.solve(normal, jacobian.T @ residual + fitted.z)
-        tried = np.clip(fitted.z + np.array([[0.0], [0.25], [0.5], [1.0]]) * step, -Z_BOUND, Z_BOUND)
-        best = tried[int(np.argmin(cost(tried)))]
-        fitted = linearised(fitted.problem, fitted.effects, best)
-    return fitted
+    probe = PROBE * np.eye(z.size)[free]
+    for _ in range(MOST_STEPS):
+        near = white(np.concatenate([z[None], z + probe, z - probe]))
+        residual, jacobian = near[:, 0], (near[:, 1 : free.size + 1] - near[:, free.size + 1 :]) / (2 * PROBE)
+        step = np.zeros(z.size)
+        step[free] = -np.linalg.solve(np.eye(free.size) + jacobian.T @ jacobian, jacobian.T @ residual + z[free])
+        tried = np.clip(z + SHORTENED[:, None] * step, -Z_BOUND, Z_BOUND)
+        cost = 0.5 * (np.sum(white(tried) ** 2, axis=0) + np.sum(tried**2, axis=1))
+        z = tried[int(np.argmin(cost))]
+        if cost[0] - cost.min() < ENOUGH:
+            break
+    return z
 
 
 def _control(setting, fitted, own, share):

@@ -39,7 +39,7 @@ def gap_text(saved: Diagnosed) -> str:
     if not gap:
         return "not judged"
     size = f"rms {_arcmin(gap.get('rms_rad'))} arcmin, noise floor {_arcmin(gap.get('noise_floor_rad'))} arcmin"
-    return f"probability {probability_text(gap.get('probability'))}; as fitted to all records: {size}"
+    return f"probability {probability_text(gap.get('probability'))}; fitted to all records, its smooth part: {size}"
 
 
 def held_out_text(saved: Diagnosed) -> str:
@@ -97,7 +97,7 @@ def shrink(saved: Diagnosed) -> list:
     columns = ["Held out", "before [arcmin]", "after [arcmin]", "noise floor [arcmin]", "closed fraction"]
     note = Note(
         "Root mean square of measured minus predicted angle of what the fit has not seen, before and after the effect is added "
-        f"to the model. Closed fraction with its {level_text(saved.level)} interval, by a Bayesian bootstrap over half legs."
+        f"to the model. Closed fraction with its {level_text(saved.level)} interval (Bayesian bootstrap over what is left out)."
     )
     return [Table(columns, lines, [1.5, 1, 1, 1.2, 1.3]), note]
 

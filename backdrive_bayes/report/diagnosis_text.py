@@ -13,7 +13,7 @@ TERMS = [
     ("Gap", "what the baseline leaves of the measured angle beyond the noise and beyond its own small misfit"),
     ("Noise floor", "rms that the noise of the measured angle and torque alone would leave"),
     ("Probability", "posterior probability of each hypothesis, the baseline's parameters re-fitted with each"),
-    ("unknown", "something is missing in the model, and no effect in the list explains it"),
+    ("unknown", "something is missing that no effect in the list explains; modules left out of the baseline keep their name"),
     ("none", "the baseline explains the data to the noise"),
     ("90 % credible set", "the most probable hypotheses that together hold at least 90 %"),
     ("Closed fraction", "share of the gap above the noise that vanishes on data left out of the fit; 100 %: down to the noise"),
@@ -43,13 +43,18 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
 def _standing(saved, rivals):
     if rivals:
         return "CAUSES STILL CONFUSABLE"
-    return "CAUSE NAMED" if _closes(saved) else "THE NAME IN DOUBT"
+    if not _foretold(saved):
+        return "THE NAME IN DOUBT"
+    return "PART OF THE CAUSE NAMED" if more_words(saved) else "CAUSE NAMED"
 
 
-def _closes(saved):
-    """Whether what is named takes anything off the gap on held-out data, as far as that was judged."""
+def _foretold(saved):
+    """Whether what is named takes anything off the gap on held-out data, as far as that was judged.
+
+    Jumps show in finer blocks than those that are held out.
+    """
     closed = saved.shrink.get("closed_fraction")
-    return not closed or closed["hi"] > 0
+    return not closed or closed["hi"] >= 0 or "stick_slip" in saved.effects
 
 
 def _join(*sentences):
@@ -65,9 +70,11 @@ def _rivals(saved):
 def _closed(saved):
     if not saved.shrink.get("closed_fraction"):
         return ""
-    what = "The best listed candidate" if saved.effects == ["unknown"] else "Added to the model, it"
-    closes = f"{what} closes {share_text(saved.shrink['closed_fraction'])} of the gap on held-out data"
-    return closes + ("." if _closes(saved) else ": it foretells nothing of what it is named for.")
+    share = share_text(saved.shrink["closed_fraction"])
+    if saved.effects == ["unknown"]:
+        return f"The best listed candidate closes {share} of the gap on held-out data."
+    doubt = "" if _foretold(saved) else ": it foretells nothing of what it is named for"
+    return f"Added to the model, it closes {share} of the gap on held-out data{doubt}."
 
 
 def next_test(saved: Diagnosed) -> list:

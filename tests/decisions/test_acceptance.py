@@ -91,6 +91,30 @@ def test_small_probabilities_of_other_effects_add_to_the_risk():
     assert result["specific_consumer_risk"] == pytest.approx(0.03, abs=0.002)
 
 
+def test_a_pair_of_which_the_fit_holds_both_is_no_gap():
+    found = diagnosis(["sensor_lag", "viscoelastic_creep"], **{"sensor_lag+viscoelastic_creep": 0.97, "none": 0.03})
+    assert judge(area(30), e=evidence(diagnosis=found, effects=["viscoelastic_creep"]))["verdict"] == "inconclusive"
+    both = evidence(diagnosis=found, effects=["sensor_lag", "viscoelastic_creep"])
+    assert judge(area(30), e=both)["verdict"] == "accepted"
+
+
+def test_what_acts_unlisted_beside_a_named_module_is_uncovered():
+    """The planted fault: its probability is in the module's name and not in "unknown"."""
+    found = diagnosis(["geometric"], geometric=0.96, unknown=0.04)
+    assert judge(area(30), e=evidence(diagnosis=found, effects=["geometric"]))["verdict"] == "accepted"
+    found["gap"] = {"unlisted_probability": 0.9}
+    result = judge(area(30), e=evidence(diagnosis=found, effects=["geometric"]))
+    assert result["verdict"] == "inconclusive" and result["structure"]["uncovered"] == {"unknown": 0.9}
+    with pytest.raises(BadInput, match="between 0 and 1"):
+        judge(area(30), e=evidence(diagnosis=found | {"gap": {"unlisted_probability": float("nan")}}))
+
+
+def test_no_verdict_on_the_gap_no_verdict_on_the_unit():
+    found = diagnosis([], none=0.97, sensor_lag=0.03) | {"inconclusive": "the search has not settled"}
+    for sds in (30, -30):
+        assert judge(area(sds), e=evidence(diagnosis=found))["verdict"] == "inconclusive"
+
+
 def test_models_that_stay_probable_are_averaged():
     one, other = evidence(), evidence(effects=["sensor_lag"], loop_area_J=AREA + 8 * SD)
     limits = Limits((area(4),))

@@ -17,7 +17,7 @@ from backdrive_bayes.gap.probabilities import (
     lasting,
     marginal,
     probabilities,
-    unexplained_beside,
+    unlisted,
 )
 
 QUIET = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": -3.0}, {})
@@ -76,11 +76,10 @@ def test_something_unknown_beside_a_module_leaves_the_module_named():
     module, effect = (marginal(joint) for joint in beside)
     assert module["geometric"] > 0.9 and "geometric+unknown" not in module and sum(module.values()) == pytest.approx(1.0)
     assert effect["unknown"] > 0.9
-    assert unexplained_beside(beside[0], ("geometric",)) > 0.9
-    alone = probabilities(Evidences.of(candidates(geometric=100.0, beside=-30.0), QUIET))
-    assert unexplained_beside(alone, ("geometric",)) < 0.1
+    assert unlisted(beside[0]) > 0.9 and unlisted(beside[1]) > 0.9
+    assert unlisted(probabilities(Evidences.of(candidates(geometric=100.0, beside=-30.0), QUIET))) < 0.1
     hum = Fast({"encoder_error": -3.0, "stick_slip": -3.0, "vibration": 80.0}, {})
-    assert unexplained_beside(probabilities(Evidences.of(candidates(geometric=100.0, beside=-30.0), hum)), ("geometric",)) > 0.9
+    assert unlisted(probabilities(Evidences.of(candidates(geometric=100.0, beside=-30.0), hum))) > 0.9
 
 
 def test_what_a_search_still_gained_counts_by_temperature_and_odds():

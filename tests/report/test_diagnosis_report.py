@@ -36,7 +36,7 @@ def test_the_first_page_is_verdict_place_and_overview(made):
         "78 % of the gap lies on the loading branches",
         "Not ruled out at 90 %: second backlash",
         "closes 91 % [88, 95] of the gap",
-        "probability 0.998; as fitted to all records: rms 1.24 arcmin, noise floor 0.107 arcmin",
+        "probability 0.998; fitted to all records, its smooth part: rms 1.24 arcmin, noise floor 0.107 arcmin",
         "records left out in turn: rms 1.24 arcmin before, 0.179 after, noise floor 0.107 arcmin",
         "interface slip, second backlash",
         "Which effect?",
@@ -80,7 +80,7 @@ def test_tables_name_the_level_of_their_intervals(made):
     text = " ".join(made[1])
     for words in ("Median [90 % interval] Unit", "Closed fraction with its 90 % interval", "[90 % interval] without and with"):
         assert words in text
-    assert "median and 90 % interval of each record" in text
+    assert "value and 90 % interval of each record" in text
 
 
 def test_a_parameter_that_was_as_good_as_fixed_gives_no_wall_of_digits(tmp_path):
@@ -114,18 +114,29 @@ def test_a_name_that_foretells_nothing_is_doubted(tmp_path):
         assert title in pages[0] and ("foretells nothing" in pages[0]) == (hi < 0)
 
 
-def test_what_acts_beside_a_named_module_is_told(tmp_path):
+@pytest.mark.parametrize(("unlisted", "told"), [(0.98, True), (0.06, False)])
+def test_what_acts_beside_a_named_module_is_told(tmp_path, unlisted, told):
     which = [{"effect": "geometric", "probability": 0.96}, {"effect": "unknown", "probability": 0.04}]
-    answer = {"effects": ["geometric"], "credible_set_90": ["geometric"], "probability_of_more": 0.98}
-    write_diagnosis(tmp_path, 1, which=which, answer=answer)
+    answer = {"effects": ["geometric"], "credible_set_90": ["geometric"]}
+    gap = write_diagnosis(tmp_path, 1)["gap"] | {"unlisted_probability": unlisted}
+    write_diagnosis(tmp_path, 1, which=which, answer=answer, gap=gap)
     pages, _ = pages_of(tmp_path)
-    assert "Something that is not listed acts beside it (98 %)" in pages[0]
+    assert ("Something that is not listed acts beside it (94 %)" in pages[0]) == told
+    assert ("PART OF THE CAUSE NAMED" in pages[0]) == told
+
+
+def test_jumps_are_not_doubted_for_what_wide_blocks_cannot_show(tmp_path):
+    result = write_diagnosis(tmp_path, 1)
+    shrink = result["shrink"] | {"closed_fraction": {"median": -0.4, "lo": -0.8, "hi": -0.1}}
+    write_diagnosis(tmp_path, 1, shrink=shrink, answer={"effects": ["stick_slip"], "credible_set_90": ["stick_slip"]})
+    assert "CAUSE NAMED" in pages_of(tmp_path)[0][0]
 
 
 def test_an_unknown_cause_credits_nothing_to_a_name(tmp_path):
     write_diagnosis(tmp_path, answer={"effects": ["unknown"], "credible_set_90": ["unknown"]})
     pages, _ = pages_of(tmp_path)
     assert "GAP OF UNKNOWN CAUSE" in pages[0] and "The best listed candidate closes 91 %" in pages[0]
+    assert "foretells nothing" not in pages[0]
     assert "Parameters of" not in " ".join(pages)
 
 
