@@ -64,7 +64,7 @@ def share_text(interval: dict | None) -> str:
     """A fraction with its interval as per cent."""
     if not interval:
         return "not defined"
-    median, lo, hi = (f"{100 * interval[k] + 0.0:.0f}".replace("-", "−") for k in ("median", "lo", "hi"))
+    median, lo, hi = (f"{round(100 * interval[k])}".replace("-", "−") for k in ("median", "lo", "hi"))
     return f"{median} %" if interval["lo"] == interval["hi"] else f"{median} % [{lo}, {hi}]"
 
 
