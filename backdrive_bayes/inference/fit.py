@@ -204,10 +204,7 @@ def _fit(unit, baseline, seed, settings, quantities, scale, resume, progress) ->
     def enough(drawn: Ensembles) -> bool:
         seconds = before + time.perf_counter() - began
         state["weights"] = _draw_weights(problem, discrepancy, drawn, seed)
-        # Walkers that still come in from afar show in the log posterior first.
-        everything = np.concatenate([drawn.z, drawn.log_posterior[..., None]], axis=-1)
-        convergence = diagnose_draws((*problem.labels, "log_posterior"), everything, drawn.step, seconds)
-        convergence = replace(convergence, burnt_in=drawn.burnt_in)
+        convergence = replace(diagnose_draws(problem.labels, drawn.z, drawn.step, seconds), burnt_in=drawn.burnt_in)
         if convergence.outcome is Outcome.CONVERGED and quantities is not None:
             names, values = _quantity_draws(problem, discrepancy, drawn, state["weights"], quantities)
             convergence = convergence.joined(diagnose_draws(names, values, drawn.step, seconds))

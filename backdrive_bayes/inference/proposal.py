@@ -101,7 +101,7 @@ def importance(log_posterior, proposal: StudentMixture, rng, n: int):
 
 def effective_share(weight) -> float:
     """Effective share of importance draws, (Σw)² / (n Σw²)."""
-    return float(np.sum(weight) ** 2 / np.sum(weight**2) / weight.size)
+    return float(1 / np.sum(weight**2) / weight.size)
 
 
 def temper(weight, share):

@@ -16,20 +16,17 @@ import h5py
 import numpy as np
 from emcee.backends import Backend, HDFBackend
 from emcee.moves import DEMove, Move
-from scipy.optimize import brentq
 
-from backdrive_bayes.inference.proposal import StudentMixture, best_mixture, effective_share, importance, polish, temper
+from backdrive_bayes.inference.proposal import StudentMixture, best_mixture, importance, polish, temper
 
 WORTHWHILE = 2.0
 """By how many nats a draw a refitted proposal must be better for the draws made so far to be given up."""
 
 JITTER = 0.1
 """Posterior standard deviations by which walkers that set out from one point are set apart."""
-HOTTEST = 64.0
-"""Temperature of the likelihood from which the walkers cool: without it they stay on the part of a curved ridge where they set
-out, and 90 % intervals of parameters that stand in for each other covered four fifths."""
-KEPT_BY_COOLING = 0.3
-"""Effective share of the walkers that one lowering of the temperature leaves."""
+TEMPERATURES = (64.0, 16.0, 4.0, 2.0)
+"""Of the likelihood, through which the walkers cool, two blocks each: without it they stay on the part of a curved ridge where
+they set out, and 90 % intervals of parameters that stand in for each other covered four fifths."""
 LONGEST_COOLING = 0.3
 """Share of the budget that is left."""
 LEAST_BLOCKS = 2
@@ -141,46 +138,20 @@ def warm_up(log_posterior, mode, covariance, starts, rng, settings: Settings, se
 
 
 def _cooled(log_posterior, state, rng, settings, seconds_left):
-    """Walkers (walkers, dimension) at the posterior, come there from a hot likelihood by annealed resampling.
+    """Walkers (walkers, dimension) after differential evolution at falling temperatures."""
 
-    Hot walkers find their way in by moves alone far too slowly: at each lowering of the temperature they are resampled by what it
-    makes of their likelihood (Del Moral, Doucet and Jasra, J. R. Statist. Soc. B 68, 2006), then move on.
-    """
-    if seconds_left() <= 0:
-        return state
-
-    def tempered(z, cold):
+    def tempered(z, temperature):
         # The prior of the coordinates is standard normal; it stays as it is.
         log_prior = -0.5 * np.sum(z**2, axis=1)
-        return log_prior + cold * (log_posterior(z) - log_prior)
+        return log_prior + (log_posterior(z) - log_prior) / temperature
 
-    enough, cold, steps = (1 - LONGEST_COOLING) * seconds_left(), 1 / HOTTEST, 2 * settings.block
-    while True:
-        sampler = _sampler(*state.shape, partial(tempered, cold=cold), CROWD_MOVES, rng)
-        state = sampler.run_mcmc(state, steps, skip_initial_state_check=True).coords
-        if cold == 1.0:
-            return state
-        log_likelihood = log_posterior(state) + 0.5 * np.sum(state**2, axis=1)
-        colder = _colder(log_likelihood, cold) if seconds_left() > enough else 1.0
-        weight = np.exp((colder - cold) * (log_likelihood - log_likelihood.max()))
-        state, cold, steps = _resampled(state, weight, rng), colder, settings.block // 2
-
-
-def _resampled(state, weight, rng):
-    """As many walkers, each as often as its weight says: systematic resampling, one even comb over the summed weights."""
-    comb = (rng.random() + np.arange(len(state))) / len(state)
-    return state[np.minimum(np.searchsorted(np.cumsum(weight / weight.sum()), comb), len(state) - 1)]
-
-
-def _colder(log_likelihood, cold) -> float:
-    """The lowest temperature, as its inverse, at which the walkers keep ``KEPT_BY_COOLING`` of their effective number."""
-
-    def kept(colder):
-        return effective_share(np.exp((colder - cold) * (log_likelihood - log_likelihood.max())))
-
-    if kept(1.0) >= KEPT_BY_COOLING:
-        return 1.0
-    return float(brentq(lambda colder: kept(colder) - KEPT_BY_COOLING, cold, 1.0, rtol=1e-3))
+    enough = (1 - LONGEST_COOLING) * seconds_left()
+    for temperature in TEMPERATURES:
+        if seconds_left() <= max(enough, 0.0):
+            break
+        sampler = _sampler(*state.shape, partial(tempered, temperature=temperature), CROWD_MOVES, rng)
+        state = sampler.run_mcmc(state, 2 * settings.block, skip_initial_state_check=True).coords
+    return state
 
 
 def _starts(log_posterior, proposal, rng, walkers):

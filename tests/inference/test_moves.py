@@ -189,39 +189,5 @@ def test_walkers_find_the_ends_of_a_curved_ridge(monkeypatch):
     far = Exchange.low_quantile()
     assert 0.65 < Exchange.sampled(0) / far < 1.25
     # The planted fault: begun at once at the posterior's own temperature they stay near its mode.
-    monkeypatch.setattr(sampling, "HOTTEST", 1.0)
+    monkeypatch.setattr(sampling, "TEMPERATURES", ())
     assert Exchange.sampled(0) / far < 0.45
-
-
-class Bananas:
-    """Thin bananas at once: what hot walkers know of them is of little use to cold ones."""
-
-    pairs, width = 5, 0.02
-
-    @classmethod
-    def misfit(cls, z):
-        """Sum of squares over the pairs, in widths; their number on average at the posterior."""
-        return np.sum(((z[..., ::2] + 0.5 * z[..., 1::2] ** 2) / cls.width) ** 2, axis=-1)
-
-    @classmethod
-    def log_posterior(cls, z):
-        z = np.atleast_2d(z)
-        return -0.5 * cls.misfit(z) - 0.5 * np.sum(z**2, axis=1)
-
-    @classmethod
-    def sampled(cls):
-        covariance = np.diag(np.tile([cls.width**2, 1.0], cls.pairs))
-        rng, settings = np.random.default_rng(0), Settings(walkers=192)
-        proposal, _ = warm_up(
-            cls.log_posterior, np.zeros(2 * cls.pairs), covariance, np.empty((0, 2 * cls.pairs)), rng, settings, lambda: 1e9
-        )
-        chains = begin_ensembles(cls.log_posterior, proposal, rng, settings, lambda: 1e9)
-        drawn = run_ensembles(cls.log_posterior, chains, rng, settings, lambda drawn: drawn.steps >= 80, lambda: 1e9)
-        return float(np.mean(cls.misfit(drawn.z)))
-
-
-def test_walkers_come_in_from_where_they_were_hot(monkeypatch):
-    assert 0.8 * Bananas.pairs < Bananas.sampled() < 1.4 * Bananas.pairs
-    # The planted fault: cooled by moves alone they come too late, and all ensembles alike.
-    monkeypatch.setattr(sampling, "_resampled", lambda state, weight, rng: state)
-    assert Bananas.sampled() > 3 * Bananas.pairs
