@@ -12,6 +12,7 @@ from backdrive_bayes.errors import BadInput
 SMALL = 1e-3
 """A probability that is not worth a word."""
 NO_VERDICT = "inconclusive diagnosis"
+"""What stands for the causes that a diagnosis without a verdict leaves open."""
 
 
 @dataclass(frozen=True, eq=False)

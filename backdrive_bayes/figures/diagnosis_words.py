@@ -12,6 +12,7 @@ _INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
 FAR = 1000.0
 """Standard deviations beyond which a shift is no longer told or drawn: the parameter was as good as fixed."""
 WORTH_A_WORD = 0.1
+"""Probability from which on it is said that something acts beside what is named."""
 _GLOSS = {"unknown": "unknown (not listed)", "none": "none (no gap)"}
 
 
