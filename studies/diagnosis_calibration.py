@@ -56,7 +56,7 @@ def weigh(job) -> dict:
     warnings.simplefilter("ignore")
     index, effects, removed, code = job
     rng = np.random.default_rng([SEED, index])
-    bench = draw_unit(rng, effects, plan=draw_plan(Request(1), rng), dirt=float(rng.uniform(*DIRT)))
+    bench = draw_unit(rng, effects, plan=draw_plan(Request(1), rng), soil=float(rng.uniform(*DIRT)))
     began, rng = time.perf_counter(), np.random.default_rng(0)
     setting = Setting.of(bench.unit, rng, BASELINE)
     truth = label_of(bench.truth.answer)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from backdrive_bayes.bench.effect import log_uniform
+from backdrive_bayes.bench.draws import log_uniform
 
 
 @dataclass(frozen=True)

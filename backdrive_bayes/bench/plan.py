@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PREROLL_S = 2.0
-
 
 @dataclass(frozen=True)
 class Loop:
@@ -20,16 +18,16 @@ class Loop:
 
 @dataclass(frozen=True)
 class Plan:
-    """The records of one unit and their sampling frequency [Hz]."""
+    """The records of one unit and their sampling frequency [Hz], None for one that the bench draws."""
 
     loops: tuple[Loop, ...]
-    sampling_hz: float = 1000.0
+    sampling_hz: float | None = None
 
 
 DEFAULT_PLAN = Plan((Loop(rate=0.1), Loop(rate=0.5), Loop(rate=1.0)))
 
 
-def make_plan(rates=(0.1, 0.5, 1.0), amplitudes=(1.0,), cycles=1, sampling_hz=1000.0) -> Plan:
+def make_plan(rates=(0.1, 0.5, 1.0), amplitudes=(1.0,), cycles=1, sampling_hz: float | None = 1000.0) -> Plan:
     """One record for each rate at each amplitude; units as in :class:`Loop`."""
     return Plan(tuple(Loop(a, r, cycles) for a in amplitudes for r in rates), sampling_hz)
 
@@ -39,14 +37,14 @@ def random_plan(rng) -> Plan:
     kind = rng.choice(["rates", "sweep", "cycles", "unequal", "single"], p=[0.5, 0.15, 0.15, 0.1, 0.1])
     base = float(np.exp(rng.uniform(np.log(0.08), np.log(0.4))))
     if kind == "rates":
-        return make_plan((base, 5 * base, 10 * base))
+        return make_plan((base, 5 * base, 10 * base), sampling_hz=None)
     if kind == "sweep":
-        return make_plan((5 * base,), (0.4, 0.7, 1.0))
+        return make_plan((5 * base,), (0.4, 0.7, 1.0), sampling_hz=None)
     if kind == "cycles":
-        return make_plan((2 * base, 10 * base), cycles=int(rng.integers(2, 4)))
+        return make_plan((2 * base, 10 * base), cycles=int(rng.integers(2, 4)), sampling_hz=None)
     if kind == "unequal":
-        return make_plan(tuple(base * np.cumprod(np.r_[1.0, rng.uniform(1.5, 5.0, 2)])))
-    return make_plan((base,))
+        return make_plan(tuple(base * np.cumprod(np.r_[1.0, rng.uniform(1.5, 5.0, 2)])), sampling_hz=None)
+    return make_plan((base,), sampling_hz=None)
 
 
 @dataclass(frozen=True)
@@ -79,13 +77,11 @@ def make_path(loop: Loop, rated_torque_nm: float, past) -> Path:
 
 
 def draw_past(rng, amplitude: float) -> tuple[float, ...]:
-    """Turning torques of the reducer's past as shares of the rated torque: none, one side, or both.
-
-    Pasts of small loops within loops are left out: what they leave behind is not told by one state a module.
-    """
-    sides = int(rng.integers(3))
-    levels = amplitude * rng.choice([-1, 1]) * rng.uniform(0.5, 1.0, 2) * np.array([1.0, -1.0])
-    return tuple(float(level) for level in levels[:sides])
+    """Turning torques of the reducer's past as shares of the rated torque: none, one side, both, or loops within the loop."""
+    turns = int(rng.choice([0, 1, 2, 3, 4]))
+    sizes = rng.uniform(0.5, 1.0, turns) if turns < 3 else np.sort(rng.uniform(0.1, 1.0, turns))[::-1]
+    levels = amplitude * rng.choice([-1.0, 1.0]) * sizes * (-1.0) ** np.arange(turns)
+    return tuple(float(level) for level in levels)
 
 
 def event_grid(path: Path, rated_torque_nm: float, steps_per_leg: int) -> np.ndarray:

@@ -1,90 +1,68 @@
-"""The effects the virtual bench can give a reducer: a new one is a file and a line here."""
+"""Names that a unit of any bench may be asked for, and what a diagnosis should answer to each."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
 
-from backdrive_bayes.bench.effects import (
-    asymmetric_stiffness,
-    encoder_error,
-    hardening_stiffness,
-    interface_slip,
-    load_dependent_friction,
-    rate_dependent_friction,
-    second_backlash,
-    sensor_lag,
-    stick_slip,
-    thermal_drift,
-    torque_offset,
-    viscoelastic_creep,
-)
-from backdrive_bayes.bench.unlisted import angle_channel, reducer_faults, torque_channel
+from backdrive_bayes.bench.protocol import DrawEffect, Mechanics
 from backdrive_bayes.errors import BadInput
 
 UNKNOWN, NONE = "unknown", "none"
 
-EFFECTS: dict[str, Callable] = {
-    "interface_slip": interface_slip.draw,
-    "viscoelastic_creep": viscoelastic_creep.draw,
-    "asymmetric_stiffness": asymmetric_stiffness.draw,
-    "second_backlash": second_backlash.draw,
-    "sensor_lag": sensor_lag.draw,
-    "thermal_drift": thermal_drift.draw,
-    "torque_offset": torque_offset.draw,
-    "encoder_error": encoder_error.draw,
-    "stick_slip": stick_slip.draw,
-    "rate_dependent_friction": rate_dependent_friction.draw,
-    "load_dependent_friction": load_dependent_friction.draw,
-    "hardening_stiffness": hardening_stiffness.draw,
+EFFECTS: dict[str, str] = {
+    "interface_slip": "micro-slip of the output clamp",
+    "viscoelastic_creep": "delayed compliance",
+    "asymmetric_stiffness": "unequal flanks",
+    "second_backlash": "a second stage's clearance",
+    "sensor_lag": "late angle channel",
+    "thermal_drift": "slow drift of the angle",
+    "torque_offset": "zero error or dead weight",
+    "encoder_error": "periodic interpolation error",
+    "stick_slip": "small jumps",
+    "rate_dependent_friction": "friction that follows the rate",
+    "load_dependent_friction": "friction in proportion to load",
+    "hardening_stiffness": "stiffness that changes with load",
 }
-"""Name in the contract -> draw(rng, reducer) of an effect with strength 0."""
+"""Every listed effect, and what it is in a few words."""
+
+MEMBERS = ("load_dependent_friction", "hardening_stiffness")
+"""Effects that a reducer has by itself unless it is drawn without them."""
 
 
-@dataclass(frozen=True)
-class Unlisted:
-    """An effect whose answer is `unknown`; a ``reserved`` one is kept for tests after the diagnosis is frozen."""
-
-    draw: Callable
-    reserved: bool = False
+def known_names(mechanics: Mechanics) -> tuple[str, ...]:
+    """Every name that can be asked for on this bench."""
+    return (*mechanics.effects, *mechanics.unlisted, UNKNOWN, NONE)
 
 
-UNLISTED: dict[str, Unlisted] = {
-    "mains_hum": Unlisted(angle_channel.draw_hum),
-    "sensor_jump": Unlisted(angle_channel.draw_jump),
-    "angle_scale": Unlisted(angle_channel.draw_scale),
-    "tooth_defect": Unlisted(reducer_faults.draw_tooth),
-    "temperature_stiffness": Unlisted(reducer_faults.draw_temperature),
-    "amplitude_backlash": Unlisted(reducer_faults.draw_amplitude),
-    "torque_gain_nonlinearity": Unlisted(torque_channel.draw_gain),
-    "bistable_mount": Unlisted(angle_channel.draw_bistable, reserved=True),
-    "drive_crosstalk": Unlisted(angle_channel.draw_crosstalk, reserved=True),
-    "buffer_slip": Unlisted(angle_channel.draw_buffer, reserved=True),
-    "missing_tooth": Unlisted(reducer_faults.draw_missing, reserved=True),
-    "loaded_runout": Unlisted(reducer_faults.draw_runout, reserved=True),
-    "wear": Unlisted(reducer_faults.draw_wear, reserved=True),
-    "unseen_torque_ripple": Unlisted(torque_channel.draw_ripple, reserved=True),
-    "torque_sensor_hysteresis": Unlisted(torque_channel.draw_hysteresis, reserved=True),
-}
-
-
-def known_names() -> tuple[str, ...]:
-    """Every name that can be asked for."""
-    return (*EFFECTS, *UNLISTED, UNKNOWN, NONE)
-
-
-def find_draw(name: str) -> Callable:
+def find_draw(mechanics: Mechanics, name: str) -> DrawEffect:
     """The draw of an effect by name; BadInput for any other."""
-    if name in EFFECTS:
-        return EFFECTS[name]
-    if name in UNLISTED:
-        return UNLISTED[name].draw
-    raise BadInput("effect", f"one of {', '.join(known_names())}", f"'{name}'")
+    found = mechanics.effects.get(name) or mechanics.unlisted.get(name)
+    if found is None:
+        raise BadInput("effect", f"one of {', '.join(known_names(mechanics))}", f"'{name}'")
+    return found
 
 
-def pick_unlisted(rng, reserved: bool = False) -> str:
-    """Name of an unlisted effect at random, from the open group or the reserved one."""
-    return str(rng.choice([name for name, entry in UNLISTED.items() if entry.reserved == reserved]))
+def unlisted_names(mechanics: Mechanics, reserved: bool = False) -> tuple[str, ...]:
+    """Unlisted effects of a bench: the earlier half, or the later one, which is kept for tests of a frozen diagnosis."""
+    names = tuple(mechanics.unlisted)
+    half = len(names) // 2
+    return names[half:] if reserved else names[:half]
+
+
+def choose_effects(rng, mechanics: Mechanics, asked, reserved: bool = False) -> dict[str, float]:
+    """Effects by name -> severity above 0, 'unknown' replaced by an unlisted one at random; BadInput where that cannot be."""
+    chosen = {}
+    for name, severity in asked.items():
+        if not (isinstance(severity, int | float) and math.isfinite(severity) and 0.0 <= severity <= 10.0):
+            raise BadInput(f"severity of {name}", "a number from 0 to 10", severity)
+        if name not in (UNKNOWN, NONE):
+            find_draw(mechanics, name)
+        if name != NONE and severity > 0:
+            own = str(rng.choice(unlisted_names(mechanics, reserved))) if name == UNKNOWN else name
+            chosen[own] = float(severity)
+    if NONE in asked and len(asked) > 1:
+        raise BadInput("effects", "'none' alone", ", ".join(asked))
+    return chosen
 
 
 def answer(name: str) -> str:

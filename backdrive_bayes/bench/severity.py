@@ -1,30 +1,27 @@
 """Severity: how far an effect stands out of the noise once the reducer's parameters have absorbed what they can.
 
 At severity s the effect's strength is such that the remainder r(t) of its angle, after least squares on the sensitivities of
-the reducer's parameters, the records' offsets and pasts, has sqrt(Σz⁴/Σz²) = s·``FULL`` with z = r / total noise sd: the
-rms weighted by where the effect acts, so that a short bump and a broad bend of equal height count alike.
+the reducer's parameters, the records' offsets and initial states, has sqrt(Σz⁴/Σz²) = s·``FULL`` with z = r / total noise sd:
+the rms weighted by where the effect acts, so that a short bump and a broad bend of equal height count alike.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from backdrive_bayes.bench.channel_noise import ChannelNoise
-from backdrive_bayes.bench.effect import Effect
-from backdrive_bayes.bench.mechanics import Resolution, Setting, record_angle
-from backdrive_bayes.bench.reducer import IN_PROPORTION, IN_SHARES, BenchReducer
+from backdrive_bayes.bench.protocol import BenchEffect, Circumstances, Mechanics
 
 FULL = (8.0, 15.0)
 """Range of the height at severity 1, in total noise standard deviations."""
 
-REACH = 2.0
-"""How far a parameter may be turned: so many times a factor of e^0.5, or a quarter of a share."""
+REACH_STEPS = 50
+"""How far a parameter may be turned to make an effect look smaller, in steps of ``Mechanics.turned``."""
 
-STEPS_PER_LEG = 90
 SAMPLES = 1200
-_HELD_BACK = {"load_dependent_friction": "load_friction", "hardening_stiffness": "stiffening"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,40 +31,52 @@ class Yardstick:
     ``basis`` (samples, directions) is orthonormal; along direction i no more than ``reach[i]`` noise units are absorbed.
     """
 
-    reducer: BenchReducer
-    settings: tuple[Setting, ...]
+    mechanics: Mechanics
+    reducer: Any
+    records: tuple[Circumstances, ...]
     plain_rad: np.ndarray
     noise_rad: np.ndarray
     basis: np.ndarray
     reach: np.ndarray
 
+    def change(self, effects) -> np.ndarray:
+        """Change of the angle by effects, in noise standard deviations, shape (records·samples,)."""
+        return (coarse_angle(self.mechanics, self.reducer, effects, self.records) - self.plain_rad) / self.noise_rad
+
+    def beyond(self, change) -> np.ndarray:
+        """What of a change cannot be absorbed, of the same shape."""
+        return change - self.basis @ np.clip(self.basis.T @ change, -self.reach, self.reach)
+
     def remainder(self, effects) -> np.ndarray:
         """What of the effects' angle cannot be absorbed, in noise standard deviations, shape (records, samples)."""
-        z = (coarse_angle(self.reducer, effects, self.settings) - self.plain_rad) / self.noise_rad
-        z -= self.basis @ np.clip(self.basis.T @ z, -self.reach, self.reach)
-        return z.reshape(len(self.settings), -1)
+        return self.beyond(self.change(effects)).reshape(len(self.records), -1)
 
-    def height(self, effect: Effect) -> float:
+    def height(self, effect: BenchEffect) -> float:
         """Height of an effect above what can be absorbed, in noise standard deviations."""
-        z = self.remainder((effect,)).ravel()
-        energy = float(z @ z)
-        return float(np.sqrt(np.sum(z**4) / energy)) if energy > 1e-12 else 0.0
+        return height_of(self.remainder((effect,)))
 
 
-def make_yardstick(reducer: BenchReducer, settings, noise: ChannelNoise, absent=()) -> Yardstick:
+def height_of(z) -> float:
+    """sqrt(Σz⁴/Σz²), 0 where z vanishes."""
+    energy = float(np.sum(z**2))
+    return float(np.sqrt(np.sum(z**4) / energy)) if energy > 1e-12 else 0.0
+
+
+def make_yardstick(mechanics: Mechanics, reducer, records, noise: ChannelNoise, absent=()) -> Yardstick:
     """Yardstick of a unit; ``absent`` names effects whose like a fit is not allowed to turn."""
-    plain = coarse_angle(reducer, (), settings)
-    slopes = [_slope(a, s) for a, s in zip(_split(plain, settings), settings, strict=True)]
+    records = tuple(records)
+    plain = coarse_angle(mechanics, reducer, (), records)
+    slopes = [_slope(a, r) for a, r in zip(np.split(plain, len(records)), records, strict=True)]
     noise_rad = noise.total_rad(np.concatenate(slopes))
-    held = {_HELD_BACK[name] for name in absent if name in _HELD_BACK}
-    columns = [_sensitivity(reducer, settings, plain, name) for name in (*IN_PROPORTION, *IN_SHARES) if name not in held]
-    columns += _pasts(reducer, settings, plain)
+    turned = mechanics.turned(reducer, tuple(absent))
+    columns = [coarse_angle(mechanics, other, (), records) - plain for other in turned]
+    columns += _offsets_and_states(mechanics, reducer, records, plain)
     left, size, _ = np.linalg.svd(np.column_stack(columns) / noise_rad[:, None], full_matrices=False)
     kept = size > 1e-6 * size[0]
-    return Yardstick(reducer, tuple(settings), plain, noise_rad, left[:, kept], REACH * size[kept])
+    return Yardstick(mechanics, reducer, records, plain, noise_rad, left[:, kept], REACH_STEPS * size[kept])
 
 
-def scale_to(effect: Effect, yardstick: Yardstick, height: float, rounds: int = 14) -> Effect:
+def scale_to(effect: BenchEffect, yardstick: Yardstick, height: float, rounds: int = 14) -> BenchEffect:
     """The effect at the strength that gives this height, or at its largest physical strength where that gives less."""
     low, high, strength = 0.0, effect.most, min(effect.guess, effect.most)
     for k in range(rounds if height > 0.0 else 0):
@@ -81,47 +90,36 @@ def scale_to(effect: Effect, yardstick: Yardstick, height: float, rounds: int = 
     return replace(effect, strength=0.0 if height == 0.0 else float(0.5 * (low + high)))
 
 
-def coarse_angle(reducer, effects, settings):
-    """Noise-free angle [rad] of all records on some SAMPLES samples each, joined."""
-    return np.concatenate([record_angle(reducer, effects, s, _coarse(s)) for s in settings])
+def coarse_times(where: Circumstances):
+    """The SAMPLES + 1 times [s] of a record at which severity looks."""
+    return np.linspace(0.0, where.path.end_s, SAMPLES + 1)
 
 
-def _coarse(setting):
-    return Resolution(STEPS_PER_LEG, setting.path.end_s / SAMPLES)
+def coarse_angle(mechanics: Mechanics, reducer, effects, records):
+    """Noise-free angle [rad] of all records at ``coarse_times``, joined."""
+    return np.concatenate([mechanics.angle(reducer, tuple(effects), where, coarse_times(where)) for where in records])
 
 
-def _split(values, settings):
-    return np.split(values, len(settings))
-
-
-def _sensitivity(reducer, settings, plain, name):
-    """Change of the angle [rad] when a parameter is turned by one unit of REACH."""
-    value = getattr(reducer, name)
-    unit = 0.5 * value if name in IN_PROPORTION else 0.25
-    turned = replace(reducer, **{name: value + 0.05 * unit})
-    return (coarse_angle(turned, (), settings) - plain) / 0.05
-
-
-def _pasts(reducer, settings, plain):
-    """Columns of each record alone: its offset, and two other pasts."""
-    columns, blocks = [], _split(np.arange(plain.size), settings)
-    for setting, block in zip(settings, blocks, strict=True):
+def _offsets_and_states(mechanics, reducer, records, plain):
+    """Columns of each record alone: its offset, and the change by two other initial states, per step of a parameter."""
+    columns, blocks = [], np.split(np.arange(plain.size), len(records))
+    for where, block in zip(records, blocks, strict=True):
         columns.append(np.zeros(plain.size))
-        columns[-1][block] = 10.0 * reducer.angle_rad
+        columns[-1][block] = reducer.angle_rad
         for side in (-1.0, 1.0):
-            path = _with_past(setting.path, side, reducer)
+            other = replace(where, path=_from_side(where.path, side))
             column = np.zeros(plain.size)
-            column[block] = record_angle(reducer, (), replace(setting, path=path), _coarse(setting)) - plain[block]
-            columns.append(column)
+            column[block] = mechanics.angle(reducer, (), other, coarse_times(where)) - plain[block]
+            columns.append(2.0 * column / REACH_STEPS)
     return columns
 
 
-def _with_past(path, side, reducer):
+def _from_side(path, side):
     kept = path.time_s >= 0
     peak = side * np.abs(path.torque_nm).max()
     before = -np.array([2.0, 1.0]) * abs(peak) / path.rate_nm_per_s
     return replace(path, time_s=np.r_[before, path.time_s[kept]], torque_nm=np.r_[0.0, peak, path.torque_nm[kept]])
 
 
-def _slope(angle_rad, setting):
-    return np.gradient(angle_rad, _coarse(setting).sampling_s) / setting.path.rate_nm_per_s
+def _slope(angle_rad, where):
+    return np.gradient(angle_rad, where.path.end_s / SAMPLES) / where.path.rate_nm_per_s

@@ -1,159 +1,122 @@
-"""A whole unit of the virtual bench: drawn, computed, made noisy, with its truth kept apart."""
+"""A whole unit of a virtual bench: drawn, computed, made noisy, with its truth kept apart."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from backdrive_bayes.bench import registry
-from backdrive_bayes.bench.channel_noise import ChannelNoise, angle_noise, draw_noise
-from backdrive_bayes.bench.dirt import Dirt, draw_dirt, quantise, resonance
-from backdrive_bayes.bench.effect import Effect
-from backdrive_bayes.bench.loop_truth import own_loop
-from backdrive_bayes.bench.mechanics import Resolution, Setting, record_angle, sample_times
+from backdrive_bayes.bench.benches import DEFAULT_BENCH, find_bench
+from backdrive_bayes.bench.chain import Chain, draw_chain, sample_times, write_down
+from backdrive_bayes.bench.channel_noise import ChannelNoise, draw_noise
+from backdrive_bayes.bench.loop_truth import held_record, own_effects, own_loop
 from backdrive_bayes.bench.plan import DEFAULT_PLAN, Plan, draw_past, make_path
-from backdrive_bayes.bench.reducer import BenchReducer, draw_reducer
-from backdrive_bayes.bench.severity import FULL, make_yardstick, scale_to
+from backdrive_bayes.bench.protocol import BenchEffect, Circumstances, Mechanics
+from backdrive_bayes.bench.rig import Rig, draw_rig, rig_angle
+from backdrive_bayes.bench.severity import FULL, Yardstick, make_yardstick, scale_to
+from backdrive_bayes.bench.soil import draw_soil
+from backdrive_bayes.bench.truth import BenchUnit, PlantedEffect, RecordTruth, Truth
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.record import Record, Unit
 
-STEPS_PER_LEG = 500
-_MEMBERS = ("load_dependent_friction", "hardening_stiffness")
-
 
 @dataclass(frozen=True, eq=False)
-class PlantedEffect:
-    """An effect in a unit: its name on the bench, what a diagnosis should answer, and how far it stands out.
+class _Test:
+    """What all records of a unit share; ``acting`` are the traces and then the planted effects."""
 
-    ``height`` is what severity.py defines, in noise standard deviations; it falls short of ``severity`` where ``limited``.
-    """
-
-    name: str
-    answer: str
-    severity: float
-    effect: Effect
-    height: float
-    limited: bool
-
-
-@dataclass(frozen=True, eq=False)
-class RecordTruth:
-    """Noise-free truth of one record: arrays of shape (samples,).
-
-    ``torque_nm`` is as commanded, ``angle_rad`` as read. ``effect_rad`` is what the effects make of it: the angle with them less
-    that of the same reducer without, and less the record's mean, which an encoder's offset hides.
-    ``remainder_rad`` is the part of it that the reducer's parameters cannot absorb (severity.py), computed on coarse samples.
-    ``noise_rad`` is the noise's total standard deviation. ``indicators`` are of the reducer's own settled loop, in SI units.
-    """
-
-    torque_nm: np.ndarray
-    angle_rad: np.ndarray
-    effect_rad: np.ndarray
-    remainder_rad: np.ndarray
-    noise_rad: np.ndarray
-    indicators: dict[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """What only the bench knows of a unit; ``answer`` is what a diagnosis should say, () for none."""
-
-    answer: tuple[str, ...]
-    planted: tuple[PlantedEffect, ...]
-    reducer: BenchReducer
+    mechanics: Mechanics
+    reducer: Any
     noise: ChannelNoise
-    dirt: Dirt
-    records: tuple[RecordTruth, ...]
+    chain: Chain
+    rig: Rig
+    traces: tuple[BenchEffect, ...]
+    acting: tuple[BenchEffect, ...]
+
+    def angle(self, effects, where, time_s):
+        """Noise-free angle [rad]."""
+        return self.mechanics.angle(self.reducer, effects, where, time_s)
 
 
-@dataclass(frozen=True, eq=False)
-class BenchUnit:
-    """A unit as a reader would give it, and the truth about it."""
-
-    unit: Unit
-    truth: Truth
-
-
-def draw_unit(rng, effects=None, *, plan: Plan = DEFAULT_PLAN, kind=None, dirt=1.0, reserved=False, name="bench") -> BenchUnit:
+def draw_unit(
+    rng, effects=None, *, bench=DEFAULT_BENCH, plan: Plan = DEFAULT_PLAN, kind=None, soil=1.0, reserved=False, name="bench"
+) -> BenchUnit:
     """A unit at random with ``effects``, a mapping of names to severities.
 
-    Names are those of registry.py; 'unknown' takes an unlisted effect at random (a ``reserved`` one if so asked), 'none' adds
-    nothing. ``kind`` is one of reducer.KINDS or None; ``dirt`` 0 gives a perfectly clean bench. Raises BadInput.
+    Names are those of the bench (registry.py); 'unknown' takes an unlisted effect at random (a ``reserved`` one if so asked),
+    'none' adds nothing. ``kind`` is one of the bench's kinds or None; ``soil`` 0 gives a perfectly clean bench. Raises BadInput.
     """
-    effects = _checked(effects or {}, rng, reserved)
-    reducer = draw_reducer(rng, kind, tuple(name for name in effects if name in _MEMBERS))
-    noise, settings = draw_noise(rng, reducer), _settings(rng, reducer, plan)
-    grime = draw_dirt(rng, reducer, noise, max(s.path.end_s for s in settings), dirt)
-    planted, remainders = _plant(rng, reducer, settings, noise, effects)
-    acting, step_s = tuple(p.effect for p in planted), 1.0 / plan.sampling_hz
-    truths = [_true_record(reducer, acting, grime, noise, s, step_s) for s in settings]
-    truths = [replace(t, remainder_rad=_stretch(z, t)) for t, z in zip(truths, remainders, strict=True)]
-    records = tuple(_measure(rng, t, noise, s, step_s, dirt) for t, s in zip(truths, settings, strict=True))
+    mechanics = find_bench(bench)
+    chosen = registry.choose_effects(rng, mechanics, effects or {}, reserved)
+    kind = _checked_kind(rng, mechanics, kind)
+    reducer = mechanics.draw_reducer(rng, kind, tuple(name for name in chosen if name in registry.MEMBERS))
+    noise, records = draw_noise(rng, reducer), _draw_records(rng, reducer, plan)
+    yardstick = make_yardstick(mechanics, reducer, records, noise, tuple(chosen))
+    planted = _plant(rng, yardstick, chosen)
+    traces = draw_soil(rng, yardstick, soil, chosen)
+    chain, rig = draw_chain(rng, noise, plan.sampling_hz, soil), draw_rig(rng, reducer, noise, soil)
+    weak, strong = tuple(t.effect for t in traces), tuple(p.effect for p in planted)
+    test = _Test(mechanics, reducer, noise, chain, rig, weak, (*weak, *strong))
+    remainder = yardstick.remainder(strong) if strong else np.zeros((len(records), 2))
+    truths = tuple(_true_record(rng, test, where, z) for where, z in zip(records, remainder, strict=True))
+    measured = tuple(_measure(rng, test, truth, where) for truth, where in zip(truths, records, strict=True))
+    held = held_record(mechanics, reducer, test.acting, strong, _fourth_rate(records), records[-1].start_s)
     answer = tuple(dict.fromkeys(p.answer for p in planted))
-    unit = Unit(name, reducer.rated_torque_nm, records, reducer.reduction_ratio)
-    return BenchUnit(unit, Truth(answer, planted, reducer, noise, grime, tuple(truths)))
+    truth = Truth(bench, kind, answer, planted, reducer, noise, chain, rig, traces, truths, remainder, held)
+    return BenchUnit(Unit(name, reducer.rated_torque_nm, measured, reducer.reduction_ratio), truth)
 
 
-def _checked(effects, rng, reserved):
-    chosen = {}
-    for name, severity in effects.items():
-        if not (isinstance(severity, int | float) and math.isfinite(severity) and 0.0 <= severity <= 10.0):
-            raise BadInput(f"severity of {name}", "a number from 0 to 10", severity)
-        if name not in registry.known_names():
-            registry.find_draw(name)
-        if name != registry.NONE and severity > 0:
-            chosen[registry.pick_unlisted(rng, reserved) if name == registry.UNKNOWN else name] = float(severity)
-    if registry.NONE in effects and len(effects) > 1:
-        raise BadInput("effects", "'none' alone", ", ".join(effects))
-    return chosen
+def _checked_kind(rng, mechanics, kind):
+    if kind is not None and kind not in mechanics.kinds:
+        raise BadInput("kind", f"one of {', '.join(mechanics.kinds)}", f"'{kind}'")
+    drawn = str(rng.choice(mechanics.kinds))
+    return kind or drawn
 
 
-def _settings(rng, reducer, plan):
-    settings, start = [], rng.uniform(0.0, 120.0)
+def _draw_records(rng, reducer, plan) -> tuple[Circumstances, ...]:
+    records, start = [], rng.uniform(0.0, 120.0)
     for index, loop in enumerate(plan.loops):
         path = make_path(loop, reducer.rated_torque_nm, draw_past(rng, loop.amplitude))
-        settings.append(Setting(path, float(start), index, float(rng.uniform(-1.0, 1.0))))
+        records.append(Circumstances(path, float(start), index, float(rng.uniform(-1.0, 1.0))))
         start += path.end_s + rng.uniform(10.0, 120.0)
-    return tuple(settings)
+    return tuple(records)
 
 
-def _plant(rng, reducer, settings, noise, effects):
-    """Planted effects, and for each record what cannot be absorbed of them together [noise sd], on coarse samples."""
-    if not effects:
-        return (), np.zeros((len(settings), 2))
-    yardstick, planted = make_yardstick(reducer, settings, noise, effects), []
-    for name, severity in effects.items():
+def _plant(rng, yardstick: Yardstick, chosen) -> tuple[PlantedEffect, ...]:
+    planted = []
+    for name, severity in chosen.items():
         wanted = severity * rng.uniform(*FULL)
-        effect = scale_to(registry.find_draw(name)(rng, reducer), yardstick, wanted)
+        drawn = registry.find_draw(yardstick.mechanics, name)(rng, yardstick.reducer)
+        effect = scale_to(drawn, yardstick, wanted)
         height = yardstick.height(effect)
         planted.append(PlantedEffect(name, registry.answer(name), severity, effect, height, height < 0.8 * wanted))
-    return tuple(planted), yardstick.remainder(tuple(p.effect for p in planted))
+    return tuple(planted)
 
 
-def _true_record(reducer, effects, dirt, noise, setting, step_s):
-    resolution, rate = Resolution(STEPS_PER_LEG, step_s), setting.path.rate_nm_per_s
-    torque = setting.path.torque_at(sample_times(setting.path, step_s))
-    angle = record_angle(reducer, (dirt, *effects), setting, resolution)
-    without = record_angle(reducer, (dirt,), setting, resolution) if effects else angle
-    effect, sd = angle - without, noise.total_rad(np.gradient(without, step_s) / rate)
-    indicators = own_loop(reducer, effects, setting, float(np.abs(torque).max()))
-    return RecordTruth(torque, angle, effect - effect.mean(), np.zeros(torque.size), sd, indicators)
+def _true_record(rng, test: _Test, where: Circumstances, remainder) -> RecordTruth:
+    time, rate = sample_times(rng, test.chain, where.path.end_s), where.path.rate_nm_per_s
+    angle = test.angle(test.acting, where, time)
+    without = angle if test.acting == test.traces else test.angle(test.traces, where, time)
+    effect, sd = angle - without, test.noise.total_rad(np.gradient(without, time) / rate)
+    coarse = np.linspace(0.0, where.path.end_s, remainder.size)
+    beyond, largest = np.interp(time, coarse, remainder) * sd, float(np.abs(where.path.torque_nm).max())
+    own = own_loop(test.mechanics, test.reducer, test.acting, where, largest)
+    clean = own if angle is without else own_loop(test.mechanics, test.reducer, test.traces, where, largest)
+    return RecordTruth(time, where.path.torque_at(time), angle, effect - effect.mean(), beyond, sd, own, clean)
 
 
-def _stretch(remainder, truth: RecordTruth):
-    """Remainder in rad on the record's samples."""
-    at = np.linspace(0.0, 1.0, truth.noise_rad.size)
-    return np.interp(at, np.linspace(0.0, 1.0, remainder.size), remainder) * truth.noise_rad
+def _measure(rng, test: _Test, truth: RecordTruth, where: Circumstances) -> Record:
+    """The record as the bench writes it."""
+    own = test.angle(own_effects(test.acting), where, truth.time_s)
+    angle = truth.angle_rad + rig_angle(rng, test.rig, test.reducer, where, truth.time_s, own)
+    time, torque, angle = write_down(rng, test.chain, test.noise, truth.time_s, truth.torque_nm, angle)
+    rate, amplitude = where.path.rate_nm_per_s, float(np.abs(where.path.torque_nm[where.path.time_s >= 0]).max())
+    name = f"{where.index + 1:02d}-rate-{rate:.3g}-amp-{amplitude:.3g}.csv.gz"
+    return Record(name, time, torque, angle, rate, amplitude)
 
 
-def _measure(rng, truth: RecordTruth, noise, setting, step_s, dirt):
-    """The record as the bench writes it: noise, an encoder's offset, digits."""
-    samples, rate = truth.torque_nm.size, setting.path.rate_nm_per_s
-    torque = truth.torque_nm + noise.torque_nm * rng.standard_normal(samples)
-    angle = truth.angle_rad + angle_noise(rng, samples, step_s, noise) + noise.correlated_rad * rng.uniform(-5.0, 5.0)
-    angle = quantise(angle + resonance(rng, samples, step_s, noise, dirt), noise, dirt)
-    amplitude = float(np.abs(setting.path.torque_nm[setting.path.time_s >= 0]).max())
-    name = f"{setting.index + 1:02d}-rate-{rate:.3g}-amp-{amplitude:.3g}.csv.gz"
-    return Record(name, np.arange(samples) * step_s, torque, angle, rate, amplitude)
+def _fourth_rate(records) -> float:
+    """A rate [N·m/s] between the two slowest of the records' rates, or three times the only one."""
+    rates = sorted({where.path.rate_nm_per_s for where in records})
+    return float(np.sqrt(rates[0] * rates[1])) if len(rates) > 1 else 3.0 * rates[0]

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import gzip
 import io
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.bench.unit import BenchUnit, RecordTruth
+from backdrive_bayes.bench.registry import EFFECTS
+from backdrive_bayes.bench.truth import BenchUnit, PlantedEffect, RecordTruth
 from backdrive_bayes.records.record import Record
 
 ARCMIN = 10800.0 / np.pi
-TRUTH_SCHEMA = "backdrive-bayes/bench-truth/1"
+TRUTH_SCHEMA = "backdrive-bayes/bench-truth/2"
 _POINTS = 400
+_HELD = {"rate_Nm_per_s": "rate_nm_per_s", "time_s": "time_s", "torque_Nm": "torque_nm", "angle_rad": "angle_rad"}
+_HELD |= {"without_rad": "without_rad"}
 
 
 def write_unit(bench: BenchUnit, folder: Path) -> None:
@@ -31,45 +36,76 @@ def write_unit(bench: BenchUnit, folder: Path) -> None:
 def truth_json(bench: BenchUnit) -> dict:
     """The truth of a unit, ready for JSON; noise-free curves thinned to some hundred points a record."""
     truth = bench.truth
-    planted = [
-        {
-            "name": p.name,
-            "answer": p.answer,
-            "severity": p.severity,
-            "height_in_noise_sd": p.height,
-            "limited": p.limited,
-            "parameters": p.effect.parameters(),
-        }
-        for p in truth.planted
-    ]
     named = zip(bench.unit.records, truth.records, strict=True)
+    held = {key: getattr(truth.held, name) for key, name in _HELD.items()}
+    return plain(
+        {
+            "schema": TRUTH_SCHEMA,
+            "unit": bench.unit.name,
+            "bench": truth.bench,
+            "kind": truth.kind,
+            "answer": truth.answer,
+            "planted": [_planted(p) for p in truth.planted],
+            "reducer": truth.reducer,
+            "noise": truth.noise,
+            "chain": truth.chain,
+            "rig": truth.rig,
+            "traces": [
+                {"name": t.name, "height_in_noise_sd": t.height, "parameters": t.effect.parameters()} for t in truth.traces
+            ],
+            "records": [{"record": record.name, **_curves(own)} for record, own in named],
+            "held": held,
+        }
+    )
+
+
+def plain(value):
+    """A value of dataclasses, mappings, sequences and arrays as JSON has it."""
+    if is_dataclass(value):
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [plain(v) for v in value] if isinstance(value, tuple | list) else value
+
+
+def _planted(planted: PlantedEffect) -> dict:
     return {
-        "schema": TRUTH_SCHEMA,
-        "unit": bench.unit.name,
-        "answer": list(truth.answer),
-        "planted": planted,
-        "reducer": vars(truth.reducer),
-        "noise": vars(truth.noise),
-        "dirt": truth.dirt.parameters(),
-        "records": [{"record": record.name, **_curves(own)} for record, own in named],
+        "name": planted.name,
+        "answer": planted.answer,
+        "unlisted": planted.name not in EFFECTS,
+        "severity": planted.severity,
+        "height_in_noise_sd": planted.height,
+        "limited": planted.limited,
+        "of_reducer": planted.effect.of_reducer,
+        "parameters": planted.effect.parameters(),
     }
 
 
 def _curves(own: RecordTruth) -> dict:
     every = max(1, own.torque_nm.size // _POINTS)
     curves = {
+        "time_s": own.time_s,
         "torque_Nm": own.torque_nm,
         "angle_rad": own.angle_rad,
         "effect_rad": own.effect_rad,
         "remainder_rad": own.remainder_rad,
         "noise_rad": own.noise_rad,
     }
-    return {"indicators": own.indicators, "every": every, **{k: v[::every] for k, v in curves.items()}}
+    indicators = {"indicators": own.indicators, "clean_indicators": own.clean_indicators}
+    return {**indicators, "every": every, **{k: v[::every] for k, v in curves.items()}}
 
 
 def _csv_gz(record: Record) -> bytes:
     table = np.column_stack([record.time_s, record.torque_nm, record.angle_rad * ARCMIN])
     text = io.StringIO()
     text.write("time_s,torque_Nm,angle_arcmin\n")
-    np.savetxt(text, table, fmt="%.6f,%.7f,%.4f")
+    digits = [6, _decimals(table[:, 1]), _decimals(table[:, 2])]
+    np.savetxt(text, table, fmt=",".join(f"%.{n}f" for n in digits))
     return gzip.compress(text.getvalue().encode("ascii"), mtime=0)
+
+
+def _decimals(values) -> int:
+    """Decimals that tell about a millionth of the values' range, 1 at least."""
+    return int(np.clip(6 - np.floor(np.log10(np.ptp(values))), 1, 12))

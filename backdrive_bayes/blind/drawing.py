@@ -34,7 +34,7 @@ def draw_and_write(request: Request, index: int, effects: dict[str, float], unit
     rng = np.random.default_rng([request.seed, 1, index])
     plan, name = draw_plan(request, rng), unit_name(index)
     with threadpool_limits(1):  # sums in another order would change last bits
-        bench = draw_unit(rng, effects, plan=plan, dirt=request.dirt, reserved=request.reserved, name=name)
+        bench = draw_unit(rng, effects, plan=plan, soil=request.dirt, reserved=request.reserved, name=name)
     part = Path(units) / f".{name}.{secrets.token_hex(4)}.part"
     part.mkdir()
     try:

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from backdrive_bayes.bench.registry import NONE
-from backdrive_bayes.bench.unit import BenchUnit
+from backdrive_bayes.bench.truth import BenchUnit
 from backdrive_bayes.blind.request import Request
 from backdrive_bayes.blind.truth_map import true_map
 from backdrive_bayes.errors import BadInput

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from backdrive_bayes.bench.registry import EFFECTS, UNLISTED
+from backdrive_bayes.bench.benches import DEFAULT_BENCH, find_bench
+from backdrive_bayes.bench.registry import EFFECTS
 from backdrive_bayes.blind.key import folder_digest
 from backdrive_bayes.errors import BadInput
 
 HASH, KEY, UNITS, ANSWERS = "key.sha256", Path("key") / "key.json", "units", "answers"
-_TELLING = re.compile("|".join((*EFFECTS, *UNLISTED, "truth", "severity", "planted")), re.IGNORECASE)
+_TELLING = re.compile("|".join((*EFFECTS, *find_bench(DEFAULT_BENCH).unlisted, "truth", "severity", "planted")), re.IGNORECASE)
 _UNIT_FILES = re.compile(r"unit\.toml|\d+-rate-[^/]*\.csv\.gz")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.bench.unit import BenchUnit
+from backdrive_bayes.bench.truth import BenchUnit
 
 BINS = 5
 BRANCHES = ("load+", "unload+", "load-", "unload-")

@@ -54,7 +54,7 @@ def test_the_truth_goes_only_where_asked(tmp_path):
         ["--cycles", "1.5"],
         ["--cycles", "0"],
         ["--kind", "round"],
-        ["--dirt", "-1"],
+        ["--soil", "-1"],
         ["--seed", "-1"],
         ["--truth", "OUT/truth.json"],
     ],

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter, lfilter_zi
 
-from backdrive_bayes.bench.effect import Effect
+from backdrive_bayes.bench.sliders import elements
+from backdrive_bayes.bench.sliders.effect import Effect
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,7 @@ class SensorLag(Effect):
     def read(self, run, angle_rad):
         """Late angle [rad]."""
         late = np.interp(run.time_s - self.strength * self.delay_share, run.time_s, angle_rad)
-        constant = self.strength * (1.0 - self.delay_share)
-        if constant == 0.0:
-            return late
-        ratio = 2.0 * constant / (run.time_s[1] - run.time_s[0])
-        numerator, denominator = [1.0 / (1.0 + ratio)] * 2, [1.0, (1.0 - ratio) / (1.0 + ratio)]
-        at_rest = late[0] * lfilter_zi(numerator, denominator)
-        return lfilter(numerator, denominator, late, zi=at_rest)[0]
+        return elements.relaxed(run.time_s, late, self.strength * (1.0 - self.delay_share))
 
 
 def draw(rng, reducer):

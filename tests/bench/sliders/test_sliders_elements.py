@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from backdrive_bayes.bench import elements
+from backdrive_bayes.bench.sliders import elements
 
 
 def test_a_slider_lags_by_its_band():
@@ -28,6 +28,12 @@ def test_a_dashpot_relaxes_with_its_time_constant():
     time = np.linspace(0, 3, 301)
     crept = elements.dashpots(time, np.ones(301), 2.0)[:, 0]
     np.testing.assert_allclose(crept, 1 - np.exp(-time / 2.0), atol=1e-12)
+
+
+def test_a_filter_follows_a_ramp_late_by_its_time_constant():
+    time = np.sort(np.random.default_rng(0).uniform(0, 3, 301))
+    late = elements.relaxed(time, 2.0 * (time - time[0]), 0.1)
+    np.testing.assert_allclose(late, 2.0 * (time - time[0] - 0.1 * (1 - np.exp(-(time - time[0]) / 0.1))), atol=1e-12)
 
 
 def test_a_dashpot_rests_below_its_threshold():

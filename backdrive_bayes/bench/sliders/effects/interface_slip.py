@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench import elements
-from backdrive_bayes.bench.effect import Effect
+from backdrive_bayes.bench.sliders import elements
+from backdrive_bayes.bench.sliders.effect import Effect
 
 LAWS = ("linear", "accelerating", "saturating")
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench import elements
-from backdrive_bayes.bench.effect import Effect, log_uniform
+from backdrive_bayes.bench.draws import log_uniform
+from backdrive_bayes.bench.sliders import elements
+from backdrive_bayes.bench.sliders.effect import Effect
 
 VARIANTS = ("one", "two", "stretched", "threshold")
 

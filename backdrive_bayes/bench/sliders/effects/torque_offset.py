@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backdrive_bayes.bench.effect import Effect, sign
+from backdrive_bayes.bench.draws import sign
+from backdrive_bayes.bench.sliders.effect import Effect
 
 
 @dataclass(frozen=True)

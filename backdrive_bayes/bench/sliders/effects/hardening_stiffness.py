@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.effect import Effect
+from backdrive_bayes.bench.sliders.effect import Effect
 
 LAWS = ("segments", "cubic", "softening")
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.effect import Effect, log_uniform
+from backdrive_bayes.bench.draws import log_uniform
+from backdrive_bayes.bench.sliders.effect import Effect
 
 
 @dataclass(frozen=True)

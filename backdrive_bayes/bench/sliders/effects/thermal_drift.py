@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from backdrive_bayes.bench.effect import Effect, log_uniform, sign
+from backdrive_bayes.bench.draws import log_uniform, sign
+from backdrive_bayes.bench.sliders.effect import Effect
 
 SESSION_S = 6000.0
 VARIANTS = ("linear", "warm_up", "walk", "air_conditioning")

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.effect import Effect, sign
+from backdrive_bayes.bench.draws import sign
+from backdrive_bayes.bench.sliders.effect import Effect
 
 LAWS = ("flank", "quadratic", "late")
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.effect import Effect
-from backdrive_bayes.bench.reducer import slider_levels
+from backdrive_bayes.bench.sliders.effect import Effect
+from backdrive_bayes.bench.sliders.reducer import slider_levels
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from backdrive_bayes.bench import elements
+from backdrive_bayes.bench.draws import log_uniform
+from backdrive_bayes.bench.sliders import elements
 
 SLIDERS = 192
 GAPS = 96
@@ -105,31 +106,27 @@ def draw_reducer(rng, kind: str | None = None, without: tuple[str, ...] = ()) ->
     clearance = {"geometric": (0.9, 1.5), "elastic": (0.0, 0.1), "intermediate": (0.25, 0.8)}[kind]
     friction = {"geometric": (0.008, 0.04), "elastic": (0.01, 0.05), "intermediate": (0.01, 0.06)}[kind]
     load = {"geometric": (0.01, 0.08), "elastic": (0.06, 0.2), "intermediate": (0.02, 0.12)}[kind]
-    share, drag = rng.uniform(*clearance), _log_uniform(rng, 0.01, 0.05)
+    share, drag = rng.uniform(*clearance), log_uniform(rng, 0.01, 0.05)
     bent = 0.0 if "hardening_stiffness" in without else rng.uniform(0.0, 0.75)
     knee = rng.uniform(0.3, 0.7)
     loaded = 0.0 if "load_dependent_friction" in without else rng.uniform(*load)
     return BenchReducer(
-        rated_torque_nm=float(np.round(_log_uniform(rng, 0.05, 5.0), 3)),
-        angle_rad=float(np.radians(_log_uniform(rng, 0.3, 6.0))),
+        rated_torque_nm=float(np.round(log_uniform(rng, 0.05, 5.0), 3)),
+        angle_rad=float(np.radians(log_uniform(rng, 0.3, 6.0))),
         clearance_share=share,
         drag=drag,
-        engagement=drag * _log_uniform(rng, 0.12, 0.5),
+        engagement=drag * log_uniform(rng, 0.12, 0.5),
         springback_share=rng.uniform(0.0, 0.25),
         release=rng.uniform(0.05, 0.6),
         compliance_share=float((1.0 - 0.5 * share) / (1.0 - bent * (1.0 - knee * np.tanh(1.0 / knee)))),
         stiffening=bent,
         knee=knee,
-        friction=_log_uniform(rng, *friction),
+        friction=log_uniform(rng, *friction),
         load_friction=loaded,
         spread=rng.uniform(0.3, 0.9),
         free_share=rng.uniform(0.0, 0.4),
         reduction_ratio=float(rng.integers(20, 300)),
     )
-
-
-def _log_uniform(rng, low, high):
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def _levels(count):

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.effect import Effect, log_uniform, sign
+from backdrive_bayes.bench.draws import log_uniform, sign
+from backdrive_bayes.bench.sliders.effect import Effect
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class SensorJump(Effect):
     def read(self, run, angle_rad):
         """Angle with a jump [rad]."""
         k = run.index % len(self.when)
-        jumped = run.time_s > self.when[k] * run.time_s[-1] if self.records[k] else 0.0
+        jumped = run.time_s > self.when[k] * run.path.end_s if self.records[k] else 0.0
         return angle_rad + self.direction * self.strength * run.reducer.angle_rad * jumped
 
 
@@ -81,9 +82,11 @@ class DriveCrosstalk(Effect):
 
     def read(self, run, angle_rad):
         """Angle with cross-talk [rad]."""
-        going = np.sign(np.gradient(run.torque_nm))
-        length = max(1, int(self.filter_share * run.time_s.size))
-        leaked = np.convolve(np.pad(going, (length - 1, 0), mode="edge"), np.full(length, 1.0 / length), mode="valid")
+        path, window = run.path, self.filter_share * run.path.end_s
+        going = np.sign(np.diff(path.torque_nm))
+        begin, rise = path.time_s[0], np.r_[0.0, np.cumsum(going * np.diff(path.time_s))]
+        before = np.interp(run.time_s - window, path.time_s, rise) + going[0] * np.minimum(run.time_s - window - begin, 0.0)
+        leaked = (np.interp(run.time_s, path.time_s, rise) - before) / window
         return angle_rad + self.direction * self.strength * run.reducer.angle_rad * leaked
 
 
@@ -99,7 +102,7 @@ class BufferSlip(Effect):
 
     def read(self, run, angle_rad):
         """Angle, late after the loss [rad]."""
-        late = run.time_s > self.when[run.index % len(self.when)] * run.time_s[-1]
+        late = run.time_s > self.when[run.index % len(self.when)] * run.path.end_s
         return np.interp(run.time_s - self.strength * late, run.time_s, angle_rad)
 
 

@@ -8,6 +8,7 @@ spring's travel; a dashpot gives way with time (Kelvin-Voigt; Bingham where it h
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 
 def drag_between(lower, upper, start):
@@ -16,11 +17,16 @@ def drag_between(lower, upper, start):
     ``start`` (elements,) is where they are before the first step.
     """
     place = np.array(np.broadcast_to(start, lower.shape[1:]), float)
+    return _drag(np.ascontiguousarray(lower), np.ascontiguousarray(upper), place)
+
+
+@njit(cache=True)
+def _drag(lower, upper, place):
     moved = np.empty_like(lower)
-    for low, high, out in zip(lower, upper, moved, strict=True):
-        np.maximum(place, low, out=place)
-        np.minimum(place, high, out=place)
-        out[:] = place
+    for k in range(lower.shape[0]):
+        for j in range(lower.shape[1]):
+            place[j] = min(max(place[j], lower[k, j]), upper[k, j])
+            moved[k, j] = place[j]
     return moved
 
 
@@ -58,15 +64,39 @@ def dashpots(time_s, force, time_constant_s, threshold=0.0):
     """
     taus = np.atleast_1d(np.asarray(time_constant_s, float))
     mean = 0.5 * (force[1:] + force[:-1])
-    fade = np.exp(-np.diff(time_s)[:, None] / taus)
-    place = np.zeros(taus.shape)
-    crept = np.zeros((force.size, taus.size))
-    for k, (push, decay) in enumerate(zip(mean, fade, strict=True), start=1):
-        over = push - place
-        over = over - np.clip(over, -threshold, threshold)
-        place = place + over * (1.0 - decay)
-        crept[k] = place
+    return _creep(mean, np.exp(-np.diff(time_s)[:, None] / taus), float(threshold))
+
+
+@njit(cache=True)
+def _creep(force, fade, threshold):
+    crept = np.zeros((force.size + 1, fade.shape[1]))
+    for k in range(force.size):
+        for j in range(fade.shape[1]):
+            over = force[k] - crept[k, j]
+            over -= min(max(over, -threshold), threshold)
+            crept[k + 1, j] = crept[k, j] + over * (1.0 - fade[k, j])
     return crept
+
+
+def relaxed(time_s, value, time_constant_s: float):
+    """First-order filter of a value that is straight between its times, exact, from rest, shape (steps,)."""
+    if time_constant_s <= 0.0:
+        return value
+    step = np.diff(time_s)
+    fade = np.exp(-step / time_constant_s)
+    slope = np.diff(value) / np.where(step > 0, step, 1.0)
+    return _relax(value, fade, slope * time_constant_s)
+
+
+@njit(cache=True)
+def _relax(value, fade, behind):
+    # On a straight stretch the filter's distance to the value tends to slope times time constant.
+    out, off = np.empty_like(value), 0.0
+    out[0] = value[0]
+    for k in range(fade.size):
+        off = behind[k] + (off - behind[k]) * fade[k]
+        out[k + 1] = value[k + 1] - off
+    return out
 
 
 def slip_while_loading(torque_nm, advance):

@@ -5,33 +5,42 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from backdrive_bayes.bench.effect import Effect
-from backdrive_bayes.bench.mechanics import Resolution, Setting, record_angle, sample_times
 from backdrive_bayes.bench.plan import Loop, make_path
-from backdrive_bayes.bench.reducer import KINDS, draw_reducer
-from backdrive_bayes.bench.registry import EFFECTS, UNLISTED, find_draw
+from backdrive_bayes.bench.protocol import Circumstances
+from backdrive_bayes.bench.sliders import MECHANICS
+from backdrive_bayes.bench.sliders.effect import Effect
+from backdrive_bayes.bench.sliders.reducer import KINDS, draw_reducer
+from backdrive_bayes.bench.sliders.registry import EFFECTS, UNLISTED
 
 NAMES = [*EFFECTS, *UNLISTED]
-FINE = Resolution(300, 0.002)
+STEP_S = 0.002
 
 
 def setting(rate=0.5, cycles=1, index=0, past=(), start_s=0.0, reducer=None):
-    return Setting(make_path(Loop(1.0, rate, cycles), reducer.rated_torque_nm, past), start_s, index)
+    return Circumstances(make_path(Loop(1.0, rate, cycles), reducer.rated_torque_nm, past), start_s, index)
+
+
+def times(at, step_s=STEP_S):
+    return np.arange(int(round(at.path.end_s / step_s)) + 1) * step_s
+
+
+def record_angle(reducer, effects, at, step_s=STEP_S):
+    return MECHANICS.angle(reducer, effects, at, times(at, step_s))
 
 
 def drawn(name, seed=0, kind="intermediate"):
     rng = np.random.default_rng(seed)
     reducer = draw_reducer(rng, kind)
-    return reducer, find_draw(name)(rng, reducer)
+    return reducer, {**EFFECTS, **UNLISTED}[name](rng, reducer)
 
 
 def change(name, strength, seed=0, make=lambda effect: effect, **where):
     """Torque [T_r], time and change of the angle [half angles] on one record."""
     reducer, effect = drawn(name, seed)
     at = setting(reducer=reducer, **where)
-    plain = record_angle(reducer, (), at, FINE)
-    changed = record_angle(reducer, (make(replace(effect, strength=strength)),), at, FINE)
-    time = sample_times(at.path, FINE.sampling_s)
+    plain = record_angle(reducer, (), at)
+    changed = record_angle(reducer, (make(replace(effect, strength=strength)),), at)
+    time = times(at)
     return at.path.torque_at(time) / reducer.rated_torque_nm, time, (changed - plain) / reducer.angle_rad
 
 
@@ -108,8 +117,8 @@ def test_drift_depends_on_time_not_on_torque(seed):
 def test_torque_offset_shifts_the_loop_along_torque():
     reducer, effect = drawn("torque_offset")
     at, effect = setting(reducer=reducer, cycles=2), replace(effect, strength=0.02, factors=(1.0,))
-    torque = at.path.torque_at(sample_times(at.path, FINE.sampling_s))
-    plain, shifted = (record_angle(reducer, e, at, FINE) for e in ((), (effect,)))
+    torque = at.path.torque_at(times(at))
+    plain, shifted = (record_angle(reducer, e, at) for e in ((), (effect,)))
     last = slice(8 * torque.size // 9, None)  # 0 → +T of the last cycle, steep where the clearance is crossed
     half = 0.5 * (plain[last][0] + plain[last][-1])
     move = np.interp(half, shifted[last], torque[last]) - np.interp(half, plain[last], torque[last])
@@ -119,8 +128,8 @@ def test_torque_offset_shifts_the_loop_along_torque():
 def test_encoder_error_depends_on_the_angle_alone():
     reducer, effect = drawn("encoder_error")
     at = setting(reducer=reducer)
-    plain = record_angle(reducer, (), at, FINE)
-    off = record_angle(reducer, (replace(effect, strength=0.3),), at, FINE) - plain
+    plain = record_angle(reducer, (), at)
+    off = record_angle(reducer, (replace(effect, strength=0.3),), at) - plain
     order = np.argsort(plain)
     assert np.abs(np.diff(off[order])).max() < 0.4 * np.diff(plain[order]).max() + 1e-9
 
@@ -139,7 +148,7 @@ def test_rate_dependent_friction_changes_the_width_without_time(seed):
     widths = []
     for rate in (0.05, 0.5, 5.0):
         at = setting(reducer=reducer, rate=rate)
-        step = Resolution(300, at.path.end_s / 5000)
+        step = at.path.end_s / 5000
         off = record_angle(reducer, (effect,), at, step) - record_angle(reducer, (), at, step)
         widths.append(np.mean(off[1000:3000]) - np.mean(off[3000:]))
     assert abs(widths[1]) < 1e-12
@@ -151,8 +160,8 @@ def test_rate_dependent_friction_changes_the_width_without_time(seed):
 def test_the_reducer_closes_its_tips_and_dissipates(kind, seed):
     reducer = draw_reducer(np.random.default_rng(seed), kind)
     at = setting(reducer=reducer, cycles=2)
-    torque = at.path.torque_at(sample_times(at.path, FINE.sampling_s))
-    angle = record_angle(reducer, (), at, FINE)
+    torque = at.path.torque_at(times(at))
+    angle = record_angle(reducer, (), at)
     n = torque.size // 9
     np.testing.assert_allclose(angle[5 * n], angle[9 * n], atol=1e-9 * reducer.angle_rad)
     cycle = slice(5 * n, 9 * n + 1)
@@ -164,8 +173,8 @@ def test_the_reducer_closes_its_tips_and_dissipates(kind, seed):
 def test_passive_elements_take_energy(name, seed):
     reducer, effect = drawn(name, seed)
     at = setting(reducer=reducer, cycles=2)
-    torque = at.path.torque_at(sample_times(at.path, FINE.sampling_s))
-    angle = record_angle(reducer, (replace(effect, strength=effect.guess),), at, FINE)
+    torque = at.path.torque_at(times(at))
+    angle = record_angle(reducer, (replace(effect, strength=effect.guess),), at)
     n = torque.size // 9
     cycle = slice(5 * n, 9 * n + 1)
     assert np.sum(0.5 * (torque[cycle][1:] + torque[cycle][:-1]) * np.diff(angle[cycle])) > 0
@@ -179,6 +188,19 @@ def test_every_effect_is_final_and_acts_somewhere():
         assert any(hook in vars(kind) for hook in hooks), name
 
 
-def test_half_of_the_unlisted_effects_are_reserved():
-    reserved = sum(entry.reserved for entry in UNLISTED.values())
-    assert len(UNLISTED) >= 10 and abs(2 * reserved - len(UNLISTED)) <= 1
+@pytest.mark.parametrize("name", [None, "sensor_lag", "encoder_error", "buffer_slip", "drive_crosstalk"])
+def test_the_angle_at_a_time_does_not_depend_on_other_times(name):
+    reducer, effect = drawn(name or "sensor_lag")
+    effects = (replace(effect, strength=0.5 * effect.guess),) if name else ()
+    at = setting(reducer=reducer, past=(0.9, -0.7))
+    fine = record_angle(reducer, effects, at)
+    np.testing.assert_allclose(MECHANICS.angle(reducer, effects, at, times(at)[::40]), fine[::40], atol=1e-4 * reducer.angle_rad)
+
+
+def test_turned_reducers_are_physical_and_each_is_another():
+    reducer = draw_reducer(np.random.default_rng(1), "intermediate")
+    at = setting(reducer=reducer)
+    plain = record_angle(reducer, (), at)
+    changes = [record_angle(other, (), at) - plain for other in MECHANICS.turned(reducer)]
+    assert all(0 < np.abs(change).max() < 0.1 * reducer.angle_rad for change in changes)
+    assert len(MECHANICS.turned(reducer, ("hardening_stiffness",))) == len(changes) - 1

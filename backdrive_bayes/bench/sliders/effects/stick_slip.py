@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.effect import Effect
+from backdrive_bayes.bench.sliders.effect import Effect
 
 VARIANTS = ("everywhere", "loaded", "slow")
 
