@@ -1,0 +1,1 @@
+"""Listed effects of the bench "ode"."""

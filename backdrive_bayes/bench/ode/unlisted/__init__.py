@@ -1,0 +1,1 @@
+"""Effects of the bench "ode" that no library lists."""
