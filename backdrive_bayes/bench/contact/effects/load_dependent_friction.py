@@ -1,0 +1,34 @@
+"""Coulomb friction of flanks or bearings, on a reducer that has only constant friction otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from backdrive_bayes.bench.contact.effect import ContactEffect
+
+
+@dataclass(frozen=True)
+class LoadDependentFriction(ContactEffect):
+    """Friction that grows with load by strength, its ratio: at the ``flanks``, or in the bearings beyond ``onset`` of T_r."""
+
+    flanks: bool
+    onset: float
+
+    guess = 0.03
+    most = 0.6
+
+    def chain(self, test, chain):
+        """Chain with the greater friction."""
+        if self.flanks:
+            # Flanks that barely grip tangentially would stay elastic; the grip only acts where there is friction.
+            firm = chain.tangential * (1.0 + 10.0 * self.strength)
+            return chain._replace(mu=chain.mu + self.strength * test.reducer.flank_levels(), tangential=firm)
+        level = test.reducer.bearing_levels().sum(axis=1)
+        reach = test.reducer.presliding * (1.0 + self.strength)
+        more = (self.strength / reach) * test.reducer.bearing_levels()
+        return chain._replace(bearing_load=self.strength * level, bearing_onset=self.onset, bristle=chain.bristle + more)
+
+
+def draw(rng, reducer):
+    """At the flanks or in the bearings, these from no load on or from a preload on."""
+    return LoadDependentFriction(0.0, bool(rng.integers(2)), float(rng.choice([0.0, rng.uniform(0.05, 0.2)])))
