@@ -15,6 +15,7 @@ from backdrive_bayes.bench.engine import rows
 
 _INERTIA = 0.01
 _STOP_COMPLIANCE = 0.005
+_FRICTION_WEIGHT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def _run(hinge, load_bytes, step_bytes):
     step_s = np.r_[np.ones(rows.REST_STEPS), step_s] if step_s.size else step_s
     mujoco = rows.load_engine()
     model = mujoco.MjModel.from_xml_string(_document(hinge))
-    model.dof_invweight0[:] *= rows.FRICTION_WEIGHT
+    model.dof_invweight0[:] *= _FRICTION_WEIGHT
     weight = model.tendon_invweight0
     weight[:2] = rows.weight_of_compliance(np.array([1.0 / hinge.stiffness, _STOP_COMPLIANCE]))
     # The dashpot's torque is stiffness x relaxation time x true speed; a step of the engine's clock lasts step_s.

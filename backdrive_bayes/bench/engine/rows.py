@@ -18,8 +18,6 @@ REST_STEPS = 40
 """Steps without load in which the initial state comes to rest."""
 PULL = 0.7
 """Share of a constraint's violation that one step corrects at most; below 1 keeps stiffening flanks from chattering."""
-FRICTION_WEIGHT = 1e-5
-"""Makes joint friction this much stiffer than the engine's default, so that stuck bearings do not creep."""
 
 
 def load_engine():

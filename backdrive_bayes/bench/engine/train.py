@@ -12,10 +12,12 @@ import numpy as np
 
 from backdrive_bayes.bench.engine import rows
 
-INERTIA = 0.03
+INERTIA = 0.01
 """Inertia of a body in normalised units: small enough that a gap is crossed within a few steps."""
 FLANKS = 2
 """Pairs of flanks that share the load of a link with clearance."""
+_FRICTION_WEIGHT = 1e-3
+"""Makes joint friction this much stiffer than the engine's default, so that they do not creep; still less costs convergence."""
 _FAR = 1e6
 
 
@@ -55,7 +57,7 @@ def build_train(train: Train):
     """Model and data of a train at rest, and the numbers of its bearings' dashpots among the tendons, if it has any."""
     mujoco = rows.load_engine()
     model = mujoco.MjModel.from_xml_string(_document(train))
-    model.dof_invweight0[:] *= rows.FRICTION_WEIGHT
+    model.dof_invweight0[:] *= _FRICTION_WEIGHT
     names = [model.tendon(i).name for i in range(model.ntendon)]
     for i, name in enumerate(names):
         if not name.endswith("_drag"):
