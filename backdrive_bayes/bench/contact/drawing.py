@@ -28,7 +28,7 @@ KINDS: dict[str, Ranges] = {
     "spur_train": Ranges((0.5, 60), (0.05, 1000), (3, 4), (3, 5), (0.3, 0.8), (1.1, 1.6), (0.1, 0.5), (0.02, 0.12), (20, 300)),
     "strain_wave": Ranges((0.2, 20), (0.5, 1000), (1, 2), (12, 20), (0.0, 0.06), (1.0, 1.4), (0.2, 0.9), (0.05, 0.3), (50, 160)),
     "cycloid": Ranges((0.2, 20), (1.0, 1000), (2, 2), (8, 16), (0.03, 0.4), (1.1, 1.5), (0.1, 0.7), (0.04, 0.2), (30, 200)),
-    "worm": Ranges((0.5, 60), (0.05, 1000), (1, 1), (3, 6), (0.05, 0.6), (1.0, 1.5), (0.1, 0.6), (0.25, 0.65), (10, 80)),
+    "worm": Ranges((0.5, 60), (0.05, 1000), (1, 1), (3, 6), (0.05, 0.6), (1.0, 1.5), (0.1, 0.6), (0.25, 0.8), (10, 80)),
     "plastic": Ranges((20, 360), (0.05, 20), (3, 4), (3, 6), (0.05, 0.6), (1.2, 2.0), (0.1, 0.6), (0.08, 0.35), (16, 1000)),
 }
 
@@ -57,7 +57,7 @@ def draw_reducer(rng, kind: str | None = None, without: tuple[str, ...] = ()) ->
         gap_ranks=tuple(_ranks(rng, flanks) for _ in range(stages)),
         exponent=exponent,
         film=log_uniform(rng, 0.002, 0.04),
-        drag=log_uniform(rng, 0.004, 0.08),
+        drag=log_uniform(rng, 0.004, 0.1),
         presliding=log_uniform(rng, 0.01, 0.1) * (1.0 - clearance),
         flank_friction=0.0 if "load_dependent_friction" in without else friction,
         grip=log_uniform(rng, 3.0, 15.0) * max(friction, 0.08),

@@ -77,6 +77,12 @@ class ContactEffect(BenchEffect):
         return angle
 
 
+def loaded_angle(rng, reducer: ContactReducer, low: float = 0.15, high: float = 0.85) -> float:
+    """An output angle that the reducer passes under load, on either side, between these shares of the way to T_r."""
+    free = reducer.clearance_share
+    return sign(rng) * (free + (1.0 - free) * rng.uniform(low, high))
+
+
 def sign(rng) -> float:
     """-1 or 1."""
     return float(rng.choice([-1.0, 1.0]))

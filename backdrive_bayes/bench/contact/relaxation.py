@@ -13,7 +13,10 @@ def relax(time_s, target, pole_s):
     state[0] = target[0]
     for k in range(1, time_s.size):
         step = time_s[k] - time_s[k - 1]
-        behind = (target[k] - target[k - 1]) * pole_s / step if step > 0.0 else 0.0 * pole_s
+        if step <= 0.0:
+            state[k] = state[k - 1]
+            continue
+        behind = (target[k] - target[k - 1]) * pole_s / step
         state[k] = target[k] - behind + (state[k - 1] - target[k - 1] + behind) * np.exp(-step / pole_s)
     return state
 

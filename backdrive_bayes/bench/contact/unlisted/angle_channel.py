@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.contact.effect import ContactEffect, sign
+from backdrive_bayes.bench.contact.effect import ContactEffect, loaded_angle, sign
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,12 @@ class MainsHum(ContactEffect):
 
 @dataclass(frozen=True)
 class MountStep(ContactEffect):
-    """The encoder's mount gives way once, in record ``record``, at a share ``when`` of it; strength is angle share.
+    """The encoder's mount gives way in every ``every``-th record from the first on, at a share ``when`` of it.
 
-    It moves by a jump and a settling over ``settling`` of the record.
+    It moves by strength (angle share), by a jump and a settling over ``settling`` of the record.
     """
 
-    record: int
+    every: int
     when: float
     settling: float
     direction: float
@@ -44,7 +44,7 @@ class MountStep(ContactEffect):
         end = test.where.path.end_s
         past = np.maximum(time_s - self.when * end, 0.0) / (self.settling * end)
         moved = np.where(past > 0.0, 1.0 - 0.4 * np.exp(-past), 0.0)
-        return angle + self.direction * self.strength * moved * (test.where.index == self.record)
+        return angle + self.direction * self.strength * moved * (test.where.index % self.every == 0)
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ def draw_hum(rng, reducer):
 
 
 def draw_step(rng, reducer):
-    """In one of the first three records."""
-    return MountStep(0.0, int(rng.integers(3)), rng.uniform(0.25, 0.9), rng.uniform(0.005, 0.05), sign(rng))
+    """In each record, in every second or in every third."""
+    return MountStep(0.0, int(rng.integers(1, 4)), rng.uniform(0.25, 0.9), rng.uniform(0.005, 0.05), sign(rng))
 
 
 def draw_foot(rng, reducer):
@@ -118,5 +118,5 @@ def draw_scale(rng, reducer):
 
 
 def draw_counts(rng, reducer):
-    """One to three marks on the angle's range."""
-    return MissedCounts(0.0, tuple(rng.uniform(-0.7, 0.7, int(rng.integers(1, 4))).tolist()))
+    """One to three marks that are passed under load."""
+    return MissedCounts(0.0, tuple(float(loaded_angle(rng, reducer)) for _ in range(int(rng.integers(1, 4)))))

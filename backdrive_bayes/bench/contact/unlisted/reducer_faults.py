@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.bench.contact.drawing import log_uniform
-from backdrive_bayes.bench.contact.effect import ContactEffect, sign
+from backdrive_bayes.bench.contact.effect import ContactEffect, loaded_angle, sign
 
 
 @dataclass(frozen=True)
@@ -88,14 +88,16 @@ class EccentricStage(ContactEffect):
 
 
 def draw_pit(rng, reducer):
-    """Anywhere in the measured range, a fifth of it wide at most."""
-    return PittedFlank(0.0, rng.uniform(-0.7, 0.7), rng.uniform(0.06, 0.2), sign(rng))
+    """Anywhere on the loaded flanks, over a fifth of their turn at most."""
+    width = (1.0 - reducer.clearance_share) * rng.uniform(0.08, 0.2)
+    return PittedFlank(0.0, loaded_angle(rng, reducer), width, sign(rng))
 
 
 def draw_broken(rng, reducer):
     """On either loaded side."""
-    place = rng.uniform(0.35, 0.65) if rng.integers(2) else -rng.uniform(0.5, 0.8)
-    return BrokenTooth(0.0, place, rng.uniform(0.12, 0.3), rng.uniform(0.01, 0.04))
+    loaded = 1.0 - reducer.clearance_share
+    width, middle = loaded * rng.uniform(0.15, 0.35), loaded_angle(rng, reducer, 0.3, 0.75)
+    return BrokenTooth(0.0, middle - 0.5 * width, width, loaded * rng.uniform(0.01, 0.05))
 
 
 def draw_wear(rng, reducer):
@@ -109,5 +111,5 @@ def draw_warming(rng, reducer):
 
 
 def draw_eccentric(rng, reducer):
-    """Two to eight periods in the range."""
-    return EccentricStage(0.0, log_uniform(rng, 0.25, 1.0), rng.uniform(0.0, 2 * np.pi))
+    """Two to eight periods while the flanks are loaded."""
+    return EccentricStage(0.0, (1.0 - reducer.clearance_share) * log_uniform(rng, 0.25, 1.0), rng.uniform(0.0, 2 * np.pi))
