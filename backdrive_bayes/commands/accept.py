@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from backdrive_bayes.commands.door import FORCED, collected, repeat_findings
 from backdrive_bayes.commands.output import default_out, probability_text, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
@@ -49,9 +50,11 @@ def run(args) -> int:
     batch = [Evidence.read(folder) for folder in args.batch]
     if is_result(args.unit):
         made, evidence, out = None, Evidence.read(args.unit), args.out or args.unit
+        repeat_findings(evidence.name, evidence.about)
     else:
         made, evidence, out = _fit(args, limits, options)
     verdict = assess([evidence, *others], limits, probabilities, batch)
+    verdict |= collected([evidence.about])
     with progress() as note, write_folder(out) as folder:
         if made:
             keep_fit(*made, folder, not args.no_figures, note)
@@ -68,10 +71,11 @@ def _fit(args, limits, options):
     from backdrive_bayes.decisions.acceptance import limited_loops
     from backdrive_bayes.decisions.evidence import Evidence
     from backdrive_bayes.decisions.loops import measured_loops
-    from backdrive_bayes.records.check import check_unit
-    unit, _ = ready_unit(args.unit)
+
+    ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
+    unit = ready.unit
     # A limit that no record can tell of is said before the sampling, not after it.
-    told = [[r[key]["estimated"] for r in check_unit(unit)["records"]] for key in ("loading_rate_Nm_per_s", "amplitude_Nm")]
+    told = [[r[key]["estimated"] for r in ready.checked["records"]] for key in ("loading_rate_Nm_per_s", "amplitude_Nm")]
     for limit in limits.limits:
         limited_loops(limit, measured_loops(*told))
     wanted = {limit.k for limit in limits.limits if limit.k is not None}
@@ -79,6 +83,7 @@ def _fit(args, limits, options):
         raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))
     with progress(options.seconds) as note:
         posterior, result = fit_unit(unit, replace(options, k=wanted.pop()) if wanted else options, note)
+    ready.stamp(result)["notes"] += ready.lines
     return (posterior, result), Evidence.of(posterior, result), args.out or default_out(unit.name, "accept")
 
 
@@ -102,7 +107,8 @@ def _models(given):
 
 
 def _summarise(verdict: dict, out: Path) -> None:
-    say(f"{verdict['unit']}: {verdict['verdict'].upper()}")
+    forced = f" ({FORCED})" if verdict["forced"] else ""
+    say(f"{verdict['unit']}: {verdict['verdict'].upper()}{forced}")
     say(f"  {verdict['reason']}")
     for row in verdict["limits"]:
         say(f"  {row['indicator']} at {row['loading_rate_Nm_per_s']:.3g} N·m/s, ±{row['amplitude_Nm']:.3g} N·m: {_shown(row)}")

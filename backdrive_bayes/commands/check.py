@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.commands.output import default_out, say, write_folder, write_json
+from backdrive_bayes.commands.output import complain, default_out, say, write_folder, write_json
 
 HELP = "read and judge a unit's records: samples, branches, cycles, closure, noise"
 _ARCMIN = 10800.0 / 3.141592653589793
@@ -16,7 +16,7 @@ def add_arguments(parser) -> None:
 
 
 def run(args) -> int:
-    """Write check.json and show what it says; 0 also where inference is advised against."""
+    """Write check.json and show what it says; 2 where an error speaks against inference."""
     from backdrive_bayes.records.check import check_unit
     from backdrive_bayes.records.unit_folder import read_unit
 
@@ -27,6 +27,9 @@ def run(args) -> int:
         write_json(folder / "check.json", result)
     _summarise(result)
     say(f"written to {out}/check.json")
+    if not result["may_infer"]:
+        complain(f"{args.unit}: expected data fit for inference, found {result['reason']}")
+        return 2
     return 0
 
 
@@ -35,8 +38,9 @@ def _summarise(result: dict) -> None:
     for record in result["records"]:
         say(f"  {record['record']}: {_extent(record)}")
         say(f"    {_levels(record['noise'])}{_closure(record)}")
-    for message in result["messages"]:
-        say(f"  {message['level']}: {message['text']}")
+    for finding in result["findings"]:
+        where = f"{finding['record']}: " if finding["record"] else ""
+        say(f"  {finding['level']}: {where}{finding['text']}")
     say(f"inference {'may go on' if result['may_infer'] else 'should not go on'}: {result['reason']}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from backdrive_bayes.commands.door import FORCED, collected, repeat_findings
 from backdrive_bayes.commands.output import default_out, probability_text, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
@@ -46,6 +47,7 @@ def run(args) -> int:
     claims = read_claims(args.claims) if args.claims else None
     evidences, made = _evidences(args, options)
     result = compare(evidences, claims, args.rope, args.level, args.seed)
+    result |= collected([e.about for e in evidences])
     out = args.out or default_out("-".join(result["names"][:3]), "compare")
     with progress() as note, write_folder(out) as folder:
         for name, (posterior, own) in made.items():
@@ -63,14 +65,18 @@ def _evidences(args, options):
     from backdrive_bayes.decisions.evidence import Evidence
 
     # Whatever cannot be read is said before the first unit is sampled.
-    units = [Evidence.read(path) if is_result(path) else ready_unit(path)[0] for path in args.units]
+    force = getattr(args, "force", False)
+    units = [Evidence.read(path) if is_result(path) else ready_unit(path, options.k, force) for path in args.units]
     evidences, made = [], {}
-    for unit in units:
-        if isinstance(unit, Evidence):
-            evidences.append(unit)
+    for ready in units:
+        if isinstance(ready, Evidence):
+            repeat_findings(ready.name, ready.about)
+            evidences.append(ready)
             continue
+        unit = ready.unit
         with progress(options.seconds) as note:
             posterior, result = fit_unit(unit, options, lambda text, name=unit.name, note=note: note(f"{name}: {text}"))
+        ready.stamp(result)["notes"] += ready.lines
         evidences.append(Evidence.of(posterior, result))
         name = default_out(unit.name, "fit").name
         made[name if name not in made else f"{name}-{len(made) + 1}"] = posterior, result
@@ -78,6 +84,8 @@ def _evidences(args, options):
 
 
 def _summarise(result: dict, out: Path) -> None:
+    if result["forced"]:
+        say(FORCED)
     if not result["converged"]:
         say("INCONCLUSIVE: a unit's sampling has not converged; give it more time (--budget)")
     for pair in result["pairs"]:

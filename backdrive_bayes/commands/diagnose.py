@@ -22,11 +22,15 @@ def add_arguments(parser) -> None:
 def run(args) -> int:
     """Diagnose and write diagnosis.json, posterior.nc of the chosen model and figures; 0 done, 4 inconclusive."""
     options = FitOptions.of(args)
-    unit = ready_unit(args.unit)[0]
+    ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
+    unit = ready.unit
     out = args.out or default_out(unit.name, "diagnose")
     require_out(out)
     with progress() as note:
         result, sampled = diagnose_unit(unit, options, note, not args.no_posterior)
+    ready.stamp(result)
+    if sampled is not None:
+        ready.stamp(sampled[1])
     with write_folder(out) as folder:
         write_json(folder / "diagnosis.json", result)
         if sampled is not None:

@@ -34,15 +34,14 @@ def run(args) -> int:
     from backdrive_bayes.inference.chain_file import read_chain, write_chain
 
     options = FitOptions.of(args)
-    unit, faults = ready_unit(args.unit)
-    for fault in faults:
-        say(f"warning: {fault}")
+    ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
+    unit = ready.unit
     out = args.out or default_out(unit.name, "fit")
     require_out(out)
     resume = read_chain(out / CHAIN, unit, options.baseline, options.seed) if args.resume else None
     with progress(options.seconds) as note:
         posterior, result = fit_unit(unit, options, note, resume)
-        result["notes"] += faults
+        ready.stamp(result)["notes"] += ready.lines
         with write_folder(out) as folder:
             keep_fit(posterior, result, folder, not args.no_figures, note)
             if not posterior.converged:

@@ -41,8 +41,10 @@ def main(argv: list[str] | None = None) -> int:
     from backdrive_bayes.commands.output import complain
 
     argv = sys.argv[1:] if argv is None else list(argv)
+    args = None
     try:
         args = _parser(argv).parse_args(argv)
+        _refuse_nul(args)
         with contextlib.suppress(ValueError):  # signals are for the main thread
             signal.signal(signal.SIGTERM, _stop)
         return args.run(args)
@@ -54,9 +56,29 @@ def main(argv: list[str] | None = None) -> int:
     except MemoryError:
         complain("not enough memory for this input")
         return 2
+    except RecursionError:
+        complain("input nested too deeply")
+        return 2
+    except (ValueError, ArithmeticError, LookupError) as error:
+        if not getattr(args, "force", False):
+            raise
+        complain(f"{_paths(args)}: expected data that can be fitted, found none even with --force ({error})")
+        return 2
     except KeyboardInterrupt:
         complain("interrupted")
         return 130
+
+
+def _refuse_nul(args) -> None:
+    for name, value in vars(args).items():
+        for part in value if isinstance(value, list) else [value]:
+            if isinstance(part, Path | str) and "\0" in str(part):
+                raise BadInput(f"option or argument {name}", "a name without NUL", repr(str(part))[:60])
+
+
+def _paths(args) -> str:
+    given = getattr(args, "units", None) or [getattr(args, "unit", "data")]
+    return ", ".join(str(path) for path in given)
 
 
 def _parser(argv: list[str]) -> argparse.ArgumentParser:

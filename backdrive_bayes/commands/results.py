@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from backdrive_bayes.commands.door import add_force_argument, ready_unit
 from backdrive_bayes.commands.output import say, write_json
 from backdrive_bayes.errors import BadInput, MissingExtra
 
 BASELINE = "geometric,elastic,friction"
+__all__ = ["FitOptions", "add_fit_arguments", "diagnose_unit", "draw_figures", "fit_unit", "is_result", "keep_fit", "ready_unit"]
 FIT_FILES = ("posterior.nc", "indicators.json")
 
 
@@ -54,16 +56,7 @@ def add_fit_arguments(parser) -> None:
     parser.add_argument("--level", type=float, default=0.9, help="level of the central intervals (default 0.9)")
     parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS", help="stop sampling after this time")
     parser.add_argument("--no-figures", action="store_true", help="write no figures")
-
-
-def ready_unit(path: Path):
-    """A unit as read, without wild samples, and what ``check`` has to say against it."""
-    from backdrive_bayes.records.check import check_unit
-    from backdrive_bayes.records.faults import without_wild
-    from backdrive_bayes.records.unit_folder import read_unit
-
-    unit = without_wild(read_unit(path))
-    return unit, [m["text"] for m in check_unit(unit)["messages"] if m["level"] != "info"]
+    add_force_argument(parser)
 
 
 def fit_unit(unit, options: FitOptions, note=lambda text: None, resume=None):

@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from backdrive_bayes.records.branches import find_branches, find_segments
 from backdrive_bayes.records.faults import find_gaps, find_plateaus, find_wild, longest_frozen, quantum
-from backdrive_bayes.records.messages import record_messages, unit_messages
+from backdrive_bayes.records.findings import Finding, errors_of, warnings_of
+from backdrive_bayes.records.judge_physics import judge_lost_motion, judge_physics, judge_rated_torque
+from backdrive_bayes.records.measured_loop import measure_loop
+from backdrive_bayes.records.messages import judge_record
+from backdrive_bayes.records.noise import estimate_noise
+from backdrive_bayes.records.plausible import why_unfinished
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.shape import closure, cycle_count, extremes, loading_rate
+from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy
 
+LOST_MOTION_SHARE = 0.03
+"""k, the share of T_r at which lost motion is taken unless somebody asks for another."""
 SCHEMA = "backdrive-bayes/check/1"
 
 
-def check_unit(unit: Unit) -> dict:
+def check_unit(unit: Unit, k: float = LOST_MOTION_SHARE) -> dict:
     """Return what is found in every record of ``unit``, ready for JSON, and whether inference may go on.
 
-    Torques are in N·m, angles in rad, times in s. ``messages`` hold a level ('info', 'warning', 'error') and
-    a text; any error speaks against inference and ``reason`` repeats it.
+    Torques are in N·m, angles in rad, times in s; ``k`` is the share of T_r at which lost motion is taken. ``findings`` hold a
+    level ('error', 'warning', 'note'), a code, a text and the record (None: the unit); any error speaks against inference and
+    ``reason`` repeats it. ``messages`` are the same as lines, with level 'info' for a note.
     """
-    records = [check_record(record, unit.rated_torque_nm) for record in unit.records]
-    messages = unit_messages(unit, records)
-    errors = [message["text"] for message in messages if message["level"] == "error"]
-    warnings = sum(message["level"] == "warning" for message in messages)
+    records = [check_record(record, unit.rated_torque_nm, k) for record in unit.records]
+    findings = [*_unit_findings(unit, records), *(Finding(**row) for record in records for row in record["findings"])]
+    errors, warnings = errors_of(findings), len(warnings_of(findings))
     clean = (
         "nothing speaks against it"
         if not warnings
@@ -38,20 +46,25 @@ def check_unit(unit: Unit) -> dict:
         "identity": dict(unit.identity),
         "data_hash": unit.data_hash,
         "records": records,
-        "messages": messages,
+        "findings": [finding.to_json() for finding in findings],
+        "messages": [finding.message() for finding in findings],
         "may_infer": not errors,
         "reason": "; ".join(errors) or clean,
     }
 
 
-def check_record(record: Record, rated_torque_nm: float) -> dict:
-    """Return what is found in one record, ready for JSON; ``messages`` judge it in words."""
-    from backdrive_bayes.records.noise import estimate_noise
+def _unit_findings(unit: Unit, records: list[dict]):
+    yield from (Finding("note", "unit_file", note) for note in unit.notes)
+    yield from judge_rated_torque(unit.rated_torque_nm, max(r["amplitude_Nm"]["estimated"] for r in records))
 
+
+def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_SHARE) -> dict:
+    """Return what is found in one record, ready for JSON; ``findings`` judge it, ``messages`` are their texts."""
     time, torque, angle = record.time_s, record.torque_nm, record.angle_rad
     segments = find_segments(time, torque)
     branches = find_branches(time, torque, segments)
     noise = estimate_noise(time, torque, angle, segments)
+    loop, rise = measure_loop(record, segments, noise), angle_rise(torque, angle, segments, noise)
     low, high = extremes(torque, segments)
     found = {
         "record": record.name,
@@ -74,10 +87,21 @@ def check_record(record: Record, rated_torque_nm: float) -> dict:
             "declared": record.loading_rate_nm_per_s,
         },
         "closure": closure(time, torque, angle, branches, noise),
-        "noise": _noise(noise),
+        "noise": _si_names(asdict(noise)),
+        "angle_rise": rise,
+        "angle_jumps": angle_jumps(angle, segments),
+        "measured_loop": None if loop is None else _si_names(asdict(loop)),
+        "energy_given": gives_energy(loop, rise),
+        "unfinished": why_unfinished(time, torque),
         "notes": list(record.notes),
     }
-    return {**found, "messages": record_messages(found, rated_torque_nm)}
+    findings = [
+        *judge_physics(found, record.columns),
+        *judge_lost_motion(found, rated_torque_nm, k),
+        *judge_record(found, rated_torque_nm),
+    ]
+    named = [replace(finding, record=record.name).to_json() for finding in findings]
+    return {**found, "findings": named, "messages": [finding.message(full=False) for finding in findings]}
 
 
 def _sampling(time: np.ndarray) -> dict:
@@ -104,6 +128,6 @@ def _branch(branch, torque: np.ndarray) -> dict:
     }
 
 
-def _noise(noise) -> dict:
-    renamed = {"torque_nm": "torque_Nm", "torque_nm_sd": "torque_Nm_sd"}
-    return {renamed.get(key, key): value for key, value in asdict(noise).items()}
+def _si_names(values: dict) -> dict:
+    """Keys with the units' own capitals, as all files spell them."""
+    return {key.replace("_nm", "_Nm").replace("area_j", "area_J"): value for key, value in values.items()}

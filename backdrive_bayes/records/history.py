@@ -10,6 +10,7 @@ from scipy.optimize import isotonic_regression
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.clock import strictly_rising
+from backdrive_bayes.records.plausible import in_si
 from backdrive_bayes.records.quantities import find_column
 from backdrive_bayes.records.readers import read_columns
 
@@ -19,15 +20,15 @@ BINS_PER_SEGMENT = 100
 
 def read_history(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and torque [N·m], shape (samples,) each; BadInput names file, row and what was found."""
-    quantities = []
+    headers, quantities = [], []
 
-    def choose(headers):
-        found = [find_column(headers, kind, None, str(path)) for kind in ("time", "torque")]
-        quantities.extend(quantity for _, quantity in found)
-        return [header for header, _ in found]
+    def choose(found_headers):
+        found = [find_column(found_headers, kind, None, str(path)) for kind in ("time", "torque")]
+        headers[:], quantities[:] = zip(*found, strict=True)
+        return list(headers)
 
     columns = read_columns(path, choose)
-    time, torque = (v * q.to_si for v, q in zip(columns.values, quantities, strict=True))
+    time, torque = in_si(path, columns, headers, quantities)
     if time.size < 2:
         raise BadInput(path, "a history of at least two samples", f"{time.size}")
     time, _ = strictly_rising(time, columns.first_row, str(path))

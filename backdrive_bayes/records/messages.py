@@ -4,33 +4,21 @@ from __future__ import annotations
 
 import math
 
-from backdrive_bayes.records.record import Unit
+from backdrive_bayes.records.findings import Finding
 
 _ARCMIN = 10800.0 / math.pi
 _FROZEN_SHARE = 0.3  # of the other channel's range passed while one stood exactly still
 
 
-def unit_messages(unit: Unit, records: list[dict]) -> list[dict]:
-    """Messages of the unit and of all its records, those of a record with its name in front."""
-    messages = [_message("info", note) for note in unit.notes]
-    for record in records:
-        messages += [_message(m["level"], f"{record['record']}: {m['text']}") for m in record["messages"]]
-    return messages
-
-
-def record_messages(found: dict, rated_torque_nm: float) -> list[dict]:
-    """Judge what ``check_record`` found."""
+def judge_record(found: dict, rated_torque_nm: float):
+    """Findings on what ``check_record`` found of one record's channels, declared values and closure."""
     judges = (_notes, _time, _channels, _plateaus, _declared, _size, _closure, _noise)
-    return [message for judge in judges for message in judge(found, rated_torque_nm)]
-
-
-def _message(level: str, text: str) -> dict:
-    return {"level": level, "text": text}
+    return [finding for judge in judges for finding in judge(found, rated_torque_nm)]
 
 
 def _notes(found, _):
     for note in found["notes"]:
-        yield _message("info", note)
+        yield Finding("note", "reader", note)
 
 
 def _time(found, _):
@@ -38,16 +26,16 @@ def _time(found, _):
     if gaps:
         worst = max(gaps, key=lambda gap: gap["torque_share"])
         level = "error" if worst["torque_share"] > 0.1 else "warning"
-        yield _message(
-            level,
+        yield Finding(
+            level, "gap",
             f"{len(gaps)} gap{'s'[: len(gaps) != 1]} in time; the worst, {worst['seconds']:.3g} s at "
             f"{worst['at_s']:.4g} s, skips {worst['torque_share']:.1%} of the torque range",
         )
     if not found["sampling"]["regular"]:
-        yield _message("info", f"sampling is uneven (steps vary by {found['sampling']['irregularity']:.0%})")
+        yield Finding("note", "uneven_sampling", f"sampling is uneven (steps vary by {found['sampling']['irregularity']:.0%})")
     fewest = min(branch["samples"] for branch in found["branches"])
     if fewest < 20:
-        yield _message("warning", f"a branch has only {fewest} sample{'s'[: fewest != 1]}")
+        yield Finding("warning", "few_samples_in_branch", f"a branch has only {fewest} sample{'s'[: fewest != 1]}")
 
 
 def _channels(found, _):
@@ -55,26 +43,26 @@ def _channels(found, _):
         wild = found["drop_outs"][channel]
         if wild:
             level = "error" if wild > 0.02 * found["samples"] else "warning"
-            yield _message(
-                level,
+            yield Finding(
+                level, "isolated_samples",
                 f"{wild} isolated {channel} sample{'s'[: wild != 1]} far from the neighbours "
                 f"(drop-outs or spikes)",
             )
         frozen = found["frozen"][channel]
         if frozen["samples"] >= 20 and frozen["other_share"] > _FROZEN_SHARE:
-            yield _message(
-                "error",
+            yield Finding(
+                "error", "frozen",
                 f"{channel} stands still for {frozen['samples']} samples from sample "
                 f"{frozen['start'] + 1} while {other} passes {frozen['other_share']:.0%} of its range",
             )
     if (found["angle_quantum_rad"] or 0.0) > found["noise"]["white_rad"]:
-        yield _message("info", f"angle comes in steps of {found['angle_quantum_rad'] * _ARCMIN:.3g}′")
+        yield Finding("note", "quantised", f"angle comes in steps of {found['angle_quantum_rad'] * _ARCMIN:.3g}′")
 
 
 def _plateaus(found, _):
     for plateau in found["plateaus"]:
-        yield _message(
-            "warning",
+        yield Finding(
+            "warning", "plateau",
             f"torque stays near {plateau['torque_Nm']:.4g} N·m for {plateau['seconds']:.3g} s "
             f"({plateau['share']:.0%} of that side): it is clipped, saturated or dwells there",
         )
@@ -87,12 +75,12 @@ def _declared(found, rated):
     ):
         declared, estimated = found[key]["declared"], found[key]["estimated"]
         if declared is not None and abs(estimated - declared) > tolerance * declared:
-            yield _message(
-                "warning", f"declared {what} {declared:.4g} {unit}, but the data show {estimated:.4g} {unit}"
+            yield Finding(
+                "warning", "declared", f"declared {what} {declared:.4g} {unit}, but the data show {estimated:.4g} {unit}"
             )
     if found["amplitude_Nm"]["estimated"] > 1.2 * rated:
-        yield _message(
-            "warning",
+        yield Finding(
+            "warning", "overload",
             f"torque reaches ±{found['amplitude_Nm']['estimated']:.4g} N·m, above the rated {rated:.4g} N·m",
         )
 
@@ -101,13 +89,13 @@ def _size(found, _):
     low, high = found["torque_range_Nm"]
     centre, amplitude = 0.5 * (low + high), 0.5 * (high - low)
     if abs(centre) > max(0.02 * amplitude, 0.5 * found["noise"]["torque_Nm"]):
-        yield _message(
-            "warning", f"torque runs from {low:.4g} to {high:.4g} N·m: off centre by {centre:.2g} N·m"
+        yield Finding(
+            "warning", "off_centre", f"torque runs from {low:.4g} to {high:.4g} N·m: off centre by {centre:.2g} N·m"
         )
     noise = math.hypot(found["noise"]["white_rad"], found["noise"]["correlated_rad"])
     if found["angle_signal_rad"] < 2.0 * noise:
-        yield _message(
-            "error",
+        yield Finding(
+            "error", "lost_in_noise",
             f"angle moves {found['angle_signal_rad'] * _ARCMIN:.3g}′ only, "
             f"not clear of its noise of {noise * _ARCMIN:.2g}′",
         )
@@ -116,20 +104,21 @@ def _size(found, _):
 def _closure(found, _):
     closure = found["closure"]
     if closure is None:
-        yield _message(
-            "info", "the record ends before the loop comes back to a tip: its closure cannot be seen"
+        yield Finding(
+            "note", "closure", "the record ends before the loop comes back to a tip: its closure cannot be seen"
         )
         return
     difference, sd = closure["difference_rad"], closure["sd_rad"]
     place = f"{closure['torque_Nm']:.3g} N·m ({closure['basis']})"
     text = f"{difference * _ARCMIN:.2g}′ ± {sd * _ARCMIN:.1g}′ at {place}"
     if abs(difference) > max(3.0 * sd, 0.02 * found["angle_range_rad"]):
-        yield _message("warning", f"the loop does not close: {text}; angle drifts, creeps or ratchets")
+        yield Finding("warning", "not_closed", f"the loop does not close: {text}; angle drifts, creeps or ratchets")
     else:
-        yield _message("info", f"the loop closes to {text}")
+        yield Finding("note", "closure", f"the loop closes to {text}")
 
 
 def _noise(found, _):
-    share = found["noise"]["torque_Nm"] / found["amplitude_Nm"]["estimated"]
-    if share > 0.02:
-        yield _message("info", f"torque noise is {share:.0%} of the amplitude")
+    noise, amplitude = found["noise"]["torque_Nm"], found["amplitude_Nm"]["estimated"]
+    if noise > 0.02 * amplitude > 0.0:
+        share = noise / amplitude
+        yield Finding("note", "torque_noise", f"torque noise is {share:.0%} of the amplitude")

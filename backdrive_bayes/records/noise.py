@@ -16,6 +16,8 @@ PRIOR_CORRELATION_TIME_S = 0.03
 PRIOR_LOG_SD = 0.5
 WINDOWS_PER_SEGMENT = 16
 TREND_DEGREE = 3
+SHORTEST_WINDOW = 16
+"""Samples of a ramp from which a spectrum can be made."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,13 @@ def estimate_noise(time_s, torque_nm, angle_rad, segments) -> NoiseEstimate:
 
 
 def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
-    """Noise of the records of one bench: common angle noise, torque noise of each record."""
-    spectra = [_median_periodogram(r) for r in records]
+    """Noise of the records of one bench: common angle noise, torque noise of each record.
+
+    Records too short for a spectrum count only where all are; the angle's noise then comes from second differences.
+    """
+    spectra = [_median_periodogram(r) for r in records if _longest(r) >= SHORTEST_WINDOW]
+    if not spectra:
+        return tuple(_rough_noise(r) for r in records)
     theta, covariance = _fit_spectra(spectra)
     sd = np.minimum(np.sqrt(np.diag(covariance)), 3.0)
     correlated, white, correlation = (float(v) for v in np.exp(theta))
@@ -95,8 +102,21 @@ class _Spectrum:
         return self.weight * np.sum(np.log(model) + self.power / model)
 
 
+def _longest(record: ChannelRecord) -> int:
+    return max(s.stop - s.start for s in record.segments)
+
+
+def _rough_noise(record: ChannelRecord) -> NoiseEstimate:
+    """All angle noise taken as white, with the uncertainty of few samples."""
+    angle, torque = _torque_noise(np.asarray(record.angle_rad)), _torque_noise(np.asarray(record.torque_nm))
+    floor = 1e-12 * float(np.ptp(record.angle_rad))
+    white, correlated = max(angle[0], floor), max(0.1 * angle[0], floor)
+    relative = PRIOR_CORRELATION_TIME_S * PRIOR_LOG_SD
+    return NoiseEstimate(white, correlated, PRIOR_CORRELATION_TIME_S, torque[0], white, correlated, relative, torque[1], 4.0)
+
+
 def _median_periodogram(record: ChannelRecord) -> _Spectrum:
-    longest = max(s.stop - s.start for s in record.segments)
+    longest = _longest(record)
     length = int(np.clip(longest // WINDOWS_PER_SEGMENT, min(32, longest), 2048))
     starts = np.concatenate([np.arange(s.start, s.stop - length + 1, length) for s in record.segments])
     windows = record.angle_rad[starts.astype(int)[:, None] + np.arange(length)]

@@ -1,4 +1,4 @@
-"""Refuse what cannot be a torque-angle loop: constant, one-sided, unfinished or with swapped channels."""
+"""Refuse what cannot be a torque-angle record: constant or swapped channels, numbers of no bench; unfinished cycles are told."""
 
 from __future__ import annotations
 
@@ -13,50 +13,58 @@ _FULL_CYCLE = (
     1.8  # torque travelled over its peak-to-peak value: 2 in a full cycle, 1.5 in three quarters of one
 )
 _LEAST_SIDE = 0.2  # the smaller of the two peaks against the larger
-_ABSURD_OVERLOAD = 20.0  # times rated torque: no reducer survives it, a wrong unit or column does
 _STRAIGHT = 0.02  # misfit of a commanded ramp against straight flanks, as a share of peak-to-peak
 _CURVED_TIMES = 4.0  # how much more the answering channel departs from them
+_LARGEST = 1e60
+_SMALLEST = 1e-30  # N·m, rad
+_SHORTEST_S, _LONGEST_S = 1e-6, 1e9
 _POINTS = 40_000  # enough to count hundreds of cycles
 _SHAPE_POINTS = 4000
 
 
+def in_si(path, columns, headers, quantities) -> list[np.ndarray]:
+    """The columns in s, N·m and rad, shape (samples,) each; BadInput for numbers that no bench writes."""
+    values = []
+    for column, header, quantity in zip(columns.values, headers, quantities, strict=True):
+        # Squares and products of larger numbers overflow.
+        bad = np.flatnonzero(np.abs(column) > _LARGEST)
+        if bad.size:
+            where = f"{path}, row {columns.first_row + bad[0]}, column '{header}'"
+            raise BadInput(where, f"a number below {_LARGEST:g}", f"{column[bad[0]]:.3g}")
+        values.append(column * quantity.to_si)
+    return values
+
+
 def check_plausible(record: Record, rated_torque_nm: float | None, where: str) -> None:
-    """Raise BadInput at ``where`` unless ``record`` holds a full torque cycle with its channels in place."""
+    """Raise BadInput at ``where`` unless ``record`` holds channels that move, each in its place."""
     torque = record.torque_nm
-    largest = float(np.abs(torque).max())
-    if np.ptp(torque) <= max(1e-9 * largest, 10.0 * np.finfo(float).tiny):
+    seconds = float(record.time_s[-1] - record.time_s[0])
+    if not _SHORTEST_S < seconds < _LONGEST_S:
+        raise BadInput(f"{where}, time", "a record of microseconds to years", f"{seconds:.3g} s (wrong unit?)")
+    if np.ptp(torque) <= max(1e-9 * float(np.abs(torque).max()), _SMALLEST):
         raise BadInput(f"{where}, torque", "torque that rises and falls", f"constant {torque[0]:.6g} N·m")
-    if np.ptp(record.angle_rad) == 0.0:
+    if np.ptp(record.angle_rad) <= _SMALLEST:
         raise BadInput(
             f"{where}, angle", "angle that answers the torque", f"constant {record.angle_rad[0]:.6g} rad"
         )
     _refuse_swapped(record, rated_torque_nm, where)
-    if rated_torque_nm is not None and largest > _ABSURD_OVERLOAD * rated_torque_nm:
-        raise BadInput(
-            f"{where}, torque",
-            f"torque near the rated {rated_torque_nm:.6g} N·m",
-            f"{largest:.6g} N·m (wrong unit or column?)",
-        )
-    _refuse_unfinished(record, where)
 
 
-def _refuse_unfinished(record: Record, where: str) -> None:
-    time, torque = _block_means(_POINTS, record.time_s, record.torque_nm)
+def why_unfinished(time_s: np.ndarray, torque_nm: np.ndarray) -> str:
+    """What keeps a record from holding a full torque cycle, empty where nothing does."""
+    time, torque = _block_means(_POINTS, time_s, torque_nm)
     segments = find_segments(time, torque)
     levels = _levels(torque, segments)
     travelled, span = float(np.abs(np.diff(levels)).sum()), float(np.ptp(levels))
     if span < 5.0 * torque_noise(torque):
-        raise BadInput(f"{where}, torque", "torque that rises and falls", "noise about a constant")
+        return "expected torque that rises and falls, found noise about a constant"
     low, high = min(levels), max(levels)
     seen = f"{low:.4g} to {high:.4g} N·m in {len(segments)} ramp{'s'[: len(segments) != 1]}"
     if min(-low, high) < _LEAST_SIDE * max(-low, high):
-        raise BadInput(f"{where}, torque", "a full cycle through positive and negative torque", seen)
+        return f"expected a full cycle through positive and negative torque, found {seen}"
     if travelled < _FULL_CYCLE * span:
-        raise BadInput(
-            f"{where}, torque",
-            "at least one full torque cycle",
-            f"{travelled / span / 2.0:.2g} of one: {seen}",
-        )
+        return f"expected at least one full torque cycle, found {travelled / span / 2.0:.2g} of one: {seen}"
+    return ""
 
 
 def _levels(torque: np.ndarray, segments: tuple[Segment, ...]) -> list[float]:

@@ -13,7 +13,8 @@ class Record:
 
     ``time_s``, ``torque_nm`` and ``angle_rad`` have shape (samples,) and hold finite float64 values in SI units;
     time rises strictly. ``loading_rate_nm_per_s`` and ``amplitude_nm`` are what the unit file declares (None where it
-    is silent). ``notes`` says in words what the reader did to the data (re-timing, dropped rows and so on).
+    is silent). ``notes`` says in words what the reader did to the data (re-timing, dropped rows and so on). ``columns`` maps
+    'time', 'torque' and 'angle' to the spelling under which the unit file finds them, a leading minus where a sign is turned.
     """
 
     name: str
@@ -23,6 +24,7 @@ class Record:
     loading_rate_nm_per_s: float | None = None
     amplitude_nm: float | None = None
     notes: tuple[str, ...] = ()
+    columns: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,7 +63,7 @@ def cycle_count(torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
         float(np.median(torque_nm[-5:])),
     ]
     low, high = extremes(torque_nm, segments)
-    return float(np.abs(np.diff(ends)).sum() / (2.0 * (high - low)))
+    return float(np.abs(np.diff(ends)).sum() / (2.0 * (high - low))) if high > low else 0.0
 
 
 def closure(time_s, torque_nm, angle_rad, branches: tuple[Branch, ...], noise) -> dict | None:

@@ -10,13 +10,16 @@ import numpy as np
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.clock import strictly_rising
 from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild
-from backdrive_bayes.records.plausible import check_plausible
-from backdrive_bayes.records.quantities import find_column
+from backdrive_bayes.records.plausible import check_plausible, in_si
+from backdrive_bayes.records.quantities import find_column, spelling
 from backdrive_bayes.records.readers import READERS, read_columns, record_suffix
 from backdrive_bayes.records.readers.limits import Columns
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.unit_toml import FILE_NAME, RecordEntry, read_unit_toml
+from backdrive_bayes.records.wraps import unwrapped
 
+FEWEST_READ = 24
+"""Samples below which no ramp, branch or noise can be told at all."""
 _KINDS = ("time", "torque", "angle")
 
 
@@ -63,20 +66,19 @@ def _read_bare(path: Path) -> Unit:
 
 
 def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
-    quantities = []
+    headers, quantities = [], []
 
-    def choose(headers: tuple[str, ...]) -> list[str]:
-        found = [find_column(headers, kind, entry.columns.get(kind), str(entry.path)) for kind in _KINDS]
+    def choose(found_headers: tuple[str, ...]) -> list[str]:
+        found = [find_column(found_headers, kind, entry.columns.get(kind), str(entry.path)) for kind in _KINDS]
         _refuse_shared(entry.path, [header for header, _ in found])
-        quantities.extend(quantity for _, quantity in found)
-        return [header for header, _ in found]
+        headers[:], quantities[:] = zip(*found, strict=True)
+        return list(headers)
 
     columns = read_columns(entry.path, choose)
     _check_length(entry.path, columns)
-    time, torque, angle = (
-        value * quantity.to_si for value, quantity in zip(columns.values, quantities, strict=True)
-    )
-    time, notes = strictly_rising(time, columns.first_row, str(entry.path))
+    time, torque, angle = in_si(entry.path, columns, headers, quantities)
+    time, clock = strictly_rising(time, columns.first_row, str(entry.path))
+    angle, wraps = unwrapped(torque, angle)
     record = Record(
         entry.name,
         time,
@@ -84,7 +86,8 @@ def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
         angle,
         entry.loading_rate_nm_per_s,
         entry.amplitude_nm,
-        columns.notes + notes,
+        (*columns.notes, *(quantity.note for quantity in quantities if quantity.note), *clock, *wraps),
+        dict(zip(_KINDS, map(spelling, headers, quantities), strict=True)),
     )
     check_plausible(record, rated_torque_nm, str(entry.path))
     return record
@@ -97,8 +100,8 @@ def _refuse_shared(path: Path, headers: list[str]) -> None:
 
 def _check_length(path: Path, columns: Columns) -> None:
     count = len(columns.values[0])
-    if count < 2:
-        raise BadInput(path, "a record of many samples", f"{count} sample{'s'[: count != 1]}")
+    if count < FEWEST_READ:
+        raise BadInput(path, f"a record of {FEWEST_READ} samples or more", f"{count} sample{'s'[: count != 1]}")
 
 
 def _hash(paths: list[Path]) -> str:

@@ -1,0 +1,108 @@
+"""Findings on signs, wraps, cycles and size: what would make every number of a fit wrong."""
+
+from __future__ import annotations
+
+import math
+
+from backdrive_bayes.records.findings import Finding
+from backdrive_bayes.records.signs import inverted, not_answering
+from backdrive_bayes.records.wraps import LARGEST_STEP_RAD
+
+_DEG = 180.0 / math.pi
+_ABSURD_TIMES = 20.0  # rated torque against the largest tested: beyond this a unit or a column is wrong
+FEWEST_SAMPLES = 60
+MOST_CYCLES = 2000
+
+
+def judge_physics(found: dict, columns: dict[str, str]):
+    """Findings of one record on its samples, cycles, signs and wraps."""
+    yield from _samples(found)
+    yield from _signs(found, columns)
+    yield from _jumps(found["angle_jumps"])
+    loop = found["measured_loop"]
+    if found["energy_given"]:
+        yield Finding(
+            "error",
+            "loop_reversed",
+            f"the loop is passed the wrong way: its area is {loop['loop_area_J']:.3g} ± {loop['loop_area_J_sd']:.1g} J, "
+            f"a reducer would give energy; torque lags the angle, or time runs backwards",
+        )
+
+
+def judge_rated_torque(rated_nm: float, tested_nm: float):
+    """A finding where the rated torque and the largest torque tested cannot belong together."""
+    if not 1.0 / _ABSURD_TIMES <= tested_nm / rated_nm <= _ABSURD_TIMES:
+        times = tested_nm / rated_nm
+        much = f"{times:.3g} times" if times > 1.0 else f"1/{1.0 / times:.3g} of"
+        yield Finding(
+            "warning",
+            "rated_torque",
+            f"the largest torque tested, {tested_nm:.4g} N·m, is {much} the rated {rated_nm:.4g} N·m: wrong unit or column?",
+        )
+
+
+def judge_lost_motion(found: dict, rated_nm: float, k: float):
+    """A finding where a record's loop does not reach the torques at which lost motion is taken."""
+    amplitude = found["amplitude_Nm"]["estimated"]
+    if amplitude < k * rated_nm:
+        yield Finding(
+            "warning",
+            "lost_motion_undefined",
+            f"lost motion is not defined: the loop's ±{amplitude:.4g} N·m does not reach "
+            f"k·T_r = {k:g} · {rated_nm:.4g} = {k * rated_nm:.4g} N·m",
+        )
+
+
+def _samples(found):
+    if found["samples"] < FEWEST_SAMPLES:
+        yield Finding("error", "few_samples", f"only {found['samples']} samples; expected {FEWEST_SAMPLES} or more")
+    if found["cycles"] > MOST_CYCLES:
+        yield Finding("error", "many_cycles", f"{found['cycles']} cycles; expected at most {MOST_CYCLES} in one record")
+    if found["unfinished"]:
+        yield Finding("error", "no_cycle", f"torque: {found['unfinished']}")
+
+
+def _signs(found, columns):
+    rise, moved = found["angle_rise"], found["angle_signal_rad"]
+    if found["unfinished"]:
+        return
+    if inverted(rise, moved):
+        yield Finding(
+            "error",
+            "angle_inverted",
+            f"the angle falls by {-rise['rise_rad'] * _DEG * 60:.4g}′ where the torque rises: one channel has the wrong sign; "
+            f"mend it in unit.toml, under [record.columns]: {_turned('angle', columns)}",
+        )
+    elif not_answering(rise, moved):
+        yield Finding(
+            "error",
+            "angle_not_answering",
+            f"the angle moves {moved * _DEG * 60:.4g}′ but does not follow the torque "
+            f"({rise['rise_rad'] * _DEG * 60:.2g}′ ± {rise['sd_rad'] * _DEG * 60:.1g}′ over a ramp): wrong column?",
+        )
+
+
+def _turned(kind, columns) -> str:
+    name = columns.get(kind, f"{kind} [unit]")
+    turned = name[1:] if name.startswith("-") else f"-{name}"
+    mark = "'" if '"' in turned else '"'
+    return f"{kind} = {mark}{turned}{mark}"
+
+
+def _jumps(jumps):
+    if jumps["against_motion"]:
+        several = jumps["count"] > 1
+        yield Finding(
+            "error" if several else "warning",
+            "angle_jumps",
+            f"the angle jumps against its motion by {jumps['size_rad'] * _DEG:.4g}° "
+            f"{jumps['count']} time{'s'[: not several]}, first at sample {jumps['first_sample']}: "
+            "an encoder that wraps at no full turn, or one that slips; unwrap it before it is read",
+        )
+    elif jumps["largest_step_rad"] > LARGEST_STEP_RAD:
+        yield Finding(
+            "error",
+            "angle_step",
+            f"the angle moves {jumps['largest_step_rad'] * _DEG:.4g}° between two samples, more than a quarter of a turn: "
+            "wrong unit, or a wrap that cannot be told",
+        )

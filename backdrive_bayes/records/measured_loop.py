@@ -1,0 +1,103 @@
+"""Area, height and width of a record's own cycle, read off the samples without a model, with standard errors from the noise.
+
+Each quantity is a weighted sum of the recorded angles, so that noise averages out instead of becoming energy: the area is the
+signed closed integral of torque over angle; tips and zero crossings are read from straight lines in time through many samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle
+from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
+from backdrive_bayes.records.record import Record, Unit
+
+
+@dataclass(frozen=True)
+class MeasuredLoop:
+    """A record's mean cycle as measured: area ∮τ dθ [J], half the angle between the tips [rad], width at zero torque [rad].
+
+    ``_sd`` are standard errors from the channels' noise. ``basis`` is 'settled' (tip to same tip, the mean of ``cycles`` of
+    them, a linear drift of ``drift_rad`` per cycle taken out) or 'first' (0 to +T to -T to 0, the first loading in it). The
+    width is None where the cycle does not reach zero torque on both branches.
+    """
+
+    record: str
+    basis: str
+    cycles: int
+    amplitude_nm: float
+    drift_rad: float
+    loop_area_j: float
+    loop_area_j_sd: float
+    half_peak_to_peak_rad: float
+    half_peak_to_peak_rad_sd: float
+    zero_torque_width_rad: float | None
+    zero_torque_width_rad_sd: float | None
+
+
+def measured_loops(unit: Unit) -> tuple[MeasuredLoop | None, ...]:
+    """The measured cycle of every record of a unit, None for a record that holds none."""
+    cut = [find_segments(r.time_s, r.torque_nm) for r in unit.records]
+    channels = [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, s) for r, s in zip(unit.records, cut, strict=True)]
+    noises = estimate_common_noise(channels)
+    return tuple(measure_loop(r, s, n) for r, s, n in zip(unit.records, cut, noises, strict=True))
+
+
+def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop | None:
+    """The mean settled cycle of a record, else its first cycle, else None; ``segments`` as from ``find_segments``."""
+    found = cycles_of(record, segments)
+    if found is None:
+        return None
+    parts = [(settled_cycle if found.settled else first_cycle)(record, segments, found, k) for k in found.starts]
+    area, height, drift = (sum(part[name] for part in parts) / len(parts) for name in ("area", "height", "drift"))
+    width, width_sd = _width(record, found, [part["widths"] for part in parts if part["widths"] is not None], noise)
+    return MeasuredLoop(
+        record=record.name,
+        basis="settled" if found.settled else "first",
+        cycles=len(parts),
+        amplitude_nm=found.amplitude_nm,
+        drift_rad=float(drift @ record.angle_rad),
+        loop_area_j=float(area @ record.angle_rad),
+        loop_area_j_sd=float(np.hypot(_angle_error(record, area, noise), _torque_error(record, found, noise))),
+        half_peak_to_peak_rad=float(height @ record.angle_rad),
+        half_peak_to_peak_rad_sd=float(np.hypot(_angle_error(record, height, noise), _corner_error(found))),
+        zero_torque_width_rad=width,
+        zero_torque_width_rad_sd=width_sd,
+    )
+
+
+def _width(record: Record, found, widths, noise) -> tuple[float | None, float | None]:
+    """Mean width at zero torque and its standard error; what a window twice as long changes is an error of its own."""
+    if not widths:
+        return None, None
+    weights = sum(widths) / len(widths)
+    short, long = weights @ record.angle_rad
+    ramp = 2.0 * RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0]) / 2.0
+    torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(widths)))
+    return float(short), float(np.sqrt(_angle_error(record, weights[0], noise) ** 2 + torque**2 + (long - short) ** 2))
+
+
+def _angle_error(record: Record, weights: np.ndarray, noise: NoiseEstimate) -> float:
+    """Standard error of a weighted sum of angles from their white and their correlated noise."""
+    white = noise.white_rad**2 * float(weights @ weights)
+    step = float(np.median(np.diff(record.time_s)))
+    decay = float(np.exp(-step / noise.correlation_time_s))
+    # weights' covariance in an AR(1) process, in one pass
+    correlated = float(weights @ (2.0 * lfilter([1.0], [1.0, -decay], weights) - weights))
+    return float(np.sqrt(max(white + noise.correlated_rad**2 * correlated, 0.0)))
+
+
+def _corner_error(found) -> float:
+    """What half a sample at the turning points is worth: noise moves them, and either way the tip is read too low."""
+    samples = np.mean([stop - start for start, stop in found.bounds])
+    return found.slope_rad_per_nm * 2.0 * found.amplitude_nm / float(samples)
+
+
+def _torque_error(record: Record, found, noise: NoiseEstimate) -> float:
+    """Standard error of the mean area from the torque's noise, which multiplies the steps of the angle."""
+    square = sum(float(np.sum(area_weights(record.angle_rad[a:b]) ** 2)) for a, b in found.bounds)
+    return noise.torque_nm * float(np.sqrt(square)) / len(found.bounds)

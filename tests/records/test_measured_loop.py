@@ -1,0 +1,90 @@
+"""The cycle as measured: right on loops whose area, height and width are known, with errors that hold."""
+
+import numpy as np
+import pytest
+from conftest import ramps
+
+from backdrive_bayes.records.measured_loop import measured_loops
+from backdrive_bayes.records.record import Record, Unit
+
+NAMES = ("loop_area_j", "half_peak_to_peak_rad", "zero_torque_width_rad")
+
+
+def play(torque, threshold=0.3, stiff=75.0, soft=1.0 / (0.02 - 0.7 / 75.0)):
+    """Play in parallel with a spring: a parallelogram of area 4·r·(T−r)/K, height T/k + (T−r)/K, width 2·r/K."""
+    position, out = 0.0, np.empty_like(torque)
+    for k, level in enumerate(torque):
+        position = min(max(position, level - threshold), level + threshold)
+        out[k] = position
+    return torque / soft + out / stiff
+
+
+TRUTH = (4 * 0.3 * 0.7 / 75.0, 1.0 * (0.02 - 0.7 / 75.0) + 0.7 / 75.0, 2 * 0.3 / 75.0)
+
+
+def loop(torque, angle, time):
+    return measured_loops(Unit("u", 1.0, (Record("r", time, torque, angle),)))[0]
+
+
+def noisy(seed, *, noise=1e-4, torque_noise=0.005, drift=0.0, knots=(0, 1, -1, 1), hertz=500):
+    time, torque = ramps(knots, hertz=hertz)
+    generator = np.random.default_rng(seed)
+    angle = play(torque) + noise * generator.normal(size=len(time)) + drift * time / time[-1]
+    return loop(torque + torque_noise * generator.normal(size=len(time)), angle, time)
+
+
+def test_without_noise_the_truth_comes_out():
+    found = noisy(0, noise=0.0, torque_noise=0.0, hertz=2000)
+    assert (found.basis, found.cycles) == ("settled", 1)
+    for name, true in zip(NAMES, TRUTH, strict=True):
+        assert getattr(found, name) == pytest.approx(true, rel=3e-3), name
+    assert found.amplitude_nm == pytest.approx(1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("options", [{}, {"noise": 1e-3, "torque_noise": 0.03}, {"drift": 0.01}, {"knots": (0, 1, -1, 1, -1, 1)}])
+def test_errors_cover_the_truth_and_noise_is_no_energy(options):
+    found = [noisy(seed, **options) for seed in range(40)]
+    for name, true in zip(NAMES, TRUTH, strict=True):
+        off = np.array([(getattr(f, name) - true) / getattr(f, f"{name}_sd") for f in found])
+        assert np.sqrt(np.mean(off**2)) < 1.6 and np.abs(off.mean()) < 0.8, (name, off.mean(), off.std())
+
+
+def test_drift_is_told_and_taken_out():
+    found = noisy(1, drift=0.01)
+    assert found.drift_rad == pytest.approx(0.01 * 4 / 5, rel=0.03)
+
+
+def test_a_single_valued_curve_has_no_area():
+    time, torque = ramps(hertz=500)
+    generator = np.random.default_rng(5)
+    found = loop(torque, 0.02 * torque + 1e-3 * generator.normal(size=len(time)), time)
+    assert abs(found.loop_area_j) < 4 * found.loop_area_j_sd
+    assert abs(found.zero_torque_width_rad) < 4 * found.zero_torque_width_rad_sd
+
+
+def test_a_loop_passed_the_wrong_way_has_a_negative_area():
+    time, torque = ramps((1, -1, 1), hertz=500)
+    assert loop(torque[::-1].copy(), play(torque)[::-1].copy(), time).loop_area_j < 0.0
+
+
+def test_a_first_cycle_is_called_so():
+    time, torque = ramps((0, 1, -1, 0), hertz=500)
+    found = loop(torque, play(torque), time)
+    assert found.basis == "first"
+    assert found.half_peak_to_peak_rad == pytest.approx(TRUTH[1], rel=3e-3)
+    assert found.loop_area_j == pytest.approx(np.trapezoid(torque, play(torque)), rel=1e-3)
+
+
+@pytest.mark.parametrize("knots", [(0, 1, 0.2), (0, 1, -1, -0.5)])
+def test_without_a_cycle_there_is_nothing(knots):
+    time, torque = ramps(knots, hertz=500)
+    assert loop(torque, play(torque), time) is None
+
+
+def test_twins_have_the_areas_that_are_told_of_them(shared_data):
+    from backdrive_bayes.records.unit_folder import read_unit
+
+    unit = read_unit(shared_data / "twins" / "reducer-2")
+    found = {m.record: m for m in measured_loops(unit)}["rate-0.05-amp-0.1.csv.gz"]
+    assert found.loop_area_j == pytest.approx(1.941e-3, abs=4 * found.loop_area_j_sd)
+    assert found.half_peak_to_peak_rad == pytest.approx(350.4 * np.pi / 10800, abs=4 * found.half_peak_to_peak_rad_sd)
