@@ -53,7 +53,8 @@ def sample_times(rng, chain: Chain, end_s: float):
     """Instants [s] at which a record is sampled, shape (samples,), from 0 to its end."""
     step = 1.0 / chain.sampling_hz
     even = np.arange(int(round(end_s / step, 6)) + 1) * step
-    return np.clip(even + chain.uneven * step * rng.uniform(-1.0, 1.0, even.size), 0.0, end_s) if chain.uneven else even
+    moved = chain.uneven * step * rng.uniform(-1.0, 1.0, even.size) if chain.uneven else 0.0
+    return np.clip(even + moved, 0.0, end_s)
 
 
 def write_down(rng, chain: Chain, noise: ChannelNoise, time_s, torque_nm, angle_rad):

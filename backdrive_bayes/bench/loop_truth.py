@@ -13,7 +13,7 @@ K = 0.03
 LEVELS = 4001
 HELD_TURNS = (0.0, 0.9, 0.3, 0.7, -0.5, 0.2, -0.9, -0.1, -0.6, 0.8, 0.0)
 """Turning torques of the held-out minor loops, as shares of the rated torque."""
-HELD_SAMPLES = 801
+HELD_SAMPLES = 841
 
 
 @dataclass(frozen=True, eq=False)

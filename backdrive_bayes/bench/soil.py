@@ -23,6 +23,8 @@ HEIGHT = (0.02, 0.15)
 ABSORBED = 0.5
 """Largest height of a trace before anything of it is absorbed."""
 _PROBE = 0.1
+_FAR = 0.2
+"""Small effects are linear in strength, so that one evaluation tells it; one more where that is far below the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +43,18 @@ def draw_soil(rng, yardstick: Yardstick, level: float, planted=()) -> tuple[Trac
 
 
 def _trace(rng, name, yardstick, level):
-    """One evaluation tells the strength, because small effects are linear in it."""
     effect = yardstick.mechanics.effects[name](rng, yardstick.reducer)
-    wanted, probe = level * rng.uniform(*HEIGHT), _PROBE * min(effect.guess, effect.most)
-    change = yardstick.change((replace(effect, strength=probe),))
-    height, whole = height_of(yardstick.beyond(change)), height_of(_without_means(change, len(yardstick.records)))
-    if whole == 0.0:
-        return Trace(name, replace(effect, strength=0.0), 0.0)
-    times = min(wanted / max(height, 1e-12), level * ABSORBED / whole, effect.most / probe)
-    return Trace(name, replace(effect, strength=float(times * probe)), float(times * height))
+    wanted, strength, height = level * rng.uniform(*HEIGHT), _PROBE * min(effect.guess, effect.most), 0.0
+    for _ in range(2):
+        change = yardstick.change((replace(effect, strength=strength),))
+        height, whole = height_of(yardstick.beyond(change)), height_of(_without_means(change, len(yardstick.records)))
+        if whole == 0.0:
+            return Trace(name, replace(effect, strength=0.0), 0.0)
+        times = min(wanted / max(height, 1e-12), level * ABSORBED / whole, effect.most / strength)
+        strength, height = float(times * strength), float(times * height)
+        if times > _FAR:
+            break
+    return Trace(name, replace(effect, strength=strength), height)
 
 
 def _without_means(change, records):

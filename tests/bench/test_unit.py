@@ -12,7 +12,7 @@ import pytest
 
 from backdrive_bayes.bench import severity as ruler
 from backdrive_bayes.bench.channel_noise import draw_noise
-from backdrive_bayes.bench.plan import Loop, Plan, make_path, make_plan, random_plan
+from backdrive_bayes.bench.plan import Loop, Plan, draw_past, make_path, make_plan, random_plan
 from backdrive_bayes.bench.protocol import Circumstances
 from backdrive_bayes.bench.registry import unlisted_names
 from backdrive_bayes.bench.sliders import MECHANICS
@@ -66,7 +66,7 @@ def test_the_same_seed_gives_the_same_unit():
 
 @pytest.mark.parametrize("name", [*MECHANICS.effects, *MECHANICS.unlisted])
 def test_severity_sets_the_height_above_noise(name):
-    full, small = (unit({name: s}).truth.planted[0] for s in (1.0, 0.1))
+    full, small = (unit({name: s}, soil=0.0).truth.planted[0] for s in (1.0, 0.1))
     assert full.limited or ruler.FULL[0] * 0.8 <= full.height <= ruler.FULL[1] * 1.2
     assert small.height < 0.15 * ruler.FULL[1] and small.effect.strength < full.effect.strength
 
@@ -109,7 +109,7 @@ def test_effects_combine():
 def test_unknown_takes_an_effect_of_the_group_asked_for():
     for seed in range(4):
         for reserved in (False, True):
-            truth = unit({"unknown": 1}, seed, reserved=reserved, plan=make_plan((5.0,), sampling_hz=200)).truth
+            truth = unit({"unknown": 1}, seed, reserved=reserved, plan=make_plan((5.0,), sampling_hz=200), soil=0.0).truth
             assert truth.answer == ("unknown",) and truth.planted[0].name in unlisted_names(MECHANICS, reserved)
 
 
@@ -157,11 +157,38 @@ def test_the_truth_is_complete_and_plain():
     assert all(0 < r["indicators"]["dissipation_ratio"] < 1 for r in truth["records"])
 
 
+def test_the_held_record_has_minor_loops_at_another_rate():
+    bench = unit({"viscoelastic_creep": 1, "sensor_lag": 1})
+    held, clean = bench.truth.held, unit({"none": 1}).truth.held
+    assert held.rate_nm_per_s not in {r.loading_rate_nm_per_s for r in bench.unit.records}
+    assert np.abs(held.torque_nm).max() == pytest.approx(0.9 * bench.unit.rated_torque_nm)
+    assert np.any(held.angle_rad != held.without_rad) and np.all(clean.angle_rad == clean.without_rad)
+
+
+def test_clean_indicators_leave_out_what_is_planted():
+    for name, same in (("none", True), ("sensor_lag", True), ("load_dependent_friction", False)):
+        for truth in unit({name: 1}).truth.records:
+            assert (truth.indicators == truth.clean_indicators) == same
+
+
+def test_a_kind_is_drawn_and_told():
+    short = make_plan((5.0,), sampling_hz=200)
+    assert {unit({"none": 1}, seed, plan=short, soil=0.0).truth.kind for seed in range(12)} == set(MECHANICS.kinds)
+    with pytest.raises(BadInput, match="geometric"):
+        unit({"none": 1}, kind="round")
+
+
 def test_random_plans_are_plans():
     rng = np.random.default_rng(0)
     plans = [random_plan(rng) for _ in range(40)]
     assert all(isinstance(p, Plan) and p.loops for p in plans)
     assert {len(p.loops) for p in plans} >= {1, 2, 3}
+
+
+def test_pasts_are_none_one_side_both_or_loops_within_the_loop():
+    pasts = [draw_past(np.random.default_rng(seed), 0.8) for seed in range(60)]
+    assert {len(past) for past in pasts} == {0, 1, 2, 3, 4}
+    assert all(np.all(np.abs(past) <= 0.8) and np.all(np.diff(np.sign(past)) != 0) for past in pasts)
 
 
 def test_a_long_record_costs_little_more_than_a_short_one():
