@@ -52,8 +52,9 @@ def stack_tables(tables):
 
 
 def make_chain(reducer: OdeReducer) -> Chain:
-    """The chain of a clean reducer."""
+    """The chain of a clean reducer, whose travel at T_r is one angle scale in spite of its friction."""
     torque, travel = stack_tables([compliance_table(mesh) for mesh in reducer.meshes()])
+    torque = torque * reducer.carried()[:, None]
     constant, ratio = reducer.levels()
     bend = reducer.presliding * np.array([1.0, reducer.bristle_ratio])
     share = np.array([1.0 - reducer.bristle_share, reducer.bristle_share])

@@ -28,15 +28,15 @@ class Kind:
 
 KINDS = {
     "planetary": Kind(
-        (0.5, 60), (0.25, 0.8), (0.003, 0.05), (0.002, 0.03), (0.01, 0.15), (1, 1.5), (0, 0.4), (0.004, 0.05), (3, 150)
+        (0.5, 60), (0.25, 0.8), (0.005, 0.05), (0.002, 0.03), (0.01, 0.15), (1, 1.5), (0, 0.4), (0.004, 0.05), (3, 150)
     ),
     "cycloidal": Kind(
         (0.2, 12), (0.03, 0.35), (0.005, 0.06), (0.004, 0.06), (0.02, 0.25), (1, 1.6), (0.1, 0.8), (0.01, 0.1), (11, 180)
     ),
     "strain_wave": Kind(
-        (0.3, 25), (0.0, 0.03), (0.003, 0.07), (0.005, 0.1), (0.02, 0.4), (1, 1.7), (0, 0.9), (0.03, 0.3), (30, 160)
+        (0.3, 25), (-0.03, 0.03), (0.002, 0.07), (0.001, 0.1), (0.02, 0.4), (1, 1.7), (0, 0.9), (0.03, 0.3), (30, 160)
     ),
-    "plastic": Kind((5, 360), (0.1, 0.6), (0.01, 0.09), (0.01, 0.09), (0.05, 0.4), (1, 1.4), (0, 0.6), (0.01, 0.15), (10, 300)),
+    "plastic": Kind((5, 360), (-0.05, 0.6), (0.01, 0.09), (0.01, 0.09), (0.05, 0.4), (1, 1.4), (0, 0.6), (0.01, 0.15), (10, 300)),
     "worm": Kind((1, 30), (0.02, 0.3), (0.02, 0.15), (0.01, 0.1), (0.2, 0.6), (1, 1.4), (0, 0.4), (0.01, 0.1), (8, 80)),
 }
 """Kind -> ranges."""
@@ -60,7 +60,8 @@ def draw_reducer(rng, kind: str | None = None, without: tuple[str, ...] = ()) ->
     if "hardening_stiffness" in without:
         power, spread = 1.0, 0.0
     drag = log_uniform(rng, *of.drag)
-    clearance = rng.uniform(*of.clearance)
+    # Half of the strain-wave gears and some of the plastic ones run without clearance.
+    clearance = max(0.0, rng.uniform(*of.clearance))
     return OdeReducer(
         rated_torque_nm=float(f"{log_uniform(rng, 0.05, 1000.0):.3g}"),
         angle_rad=ARCMIN * log_uniform(rng, *of.angle_arcmin),
@@ -68,7 +69,7 @@ def draw_reducer(rng, kind: str | None = None, without: tuple[str, ...] = ()) ->
         kind=kind,
         clearance_share=clearance,
         gap_split=rng.uniform(0.5, 0.9),
-        engagement=drag * log_uniform(rng, 0.12, 0.6),
+        engagement=min(max(drag * log_uniform(rng, 0.12, 0.6), 0.001), 0.6 * drag),
         mesh_share=rng.uniform(0.25, 0.6),
         contact_power=power,
         flank_spread=spread,

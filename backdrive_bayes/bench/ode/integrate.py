@@ -9,6 +9,8 @@ from backdrive_bayes.bench.ode.nodes import solve_step, travel_at
 
 TOLERANCE = 1e-6
 """Largest departure of the angle from a straight line between steps, in angle scales."""
+MOST_TRAVEL = 0.02
+"""Largest travel of the output in one step, in angle scales: effects that wave along the angle are followed."""
 LEAST_STEP = 1e-6
 """Smallest step as a share of a base interval."""
 
@@ -84,7 +86,7 @@ def _follow(chain, time_s, torque, widen, rub, start, tolerance):
             lowest = solve_step(wanted, gain * step * rise, chain, state, trial, passed, now_widen, now_rub)
             new = (trial[0][0] - was) / passed
             off = abs(new - slope) * passed * passed / (4.0 * (passed + last)) if trust else 0.1 * tolerance
-            if off > 2.0 * tolerance and step > LEAST_STEP:
+            if (off > 2.0 * tolerance or abs(trial[0][0] - was) > MOST_TRAVEL) and step > LEAST_STEP:
                 step = max(0.4 * step, LEAST_STEP)
                 continue
             _keep(state, trial)

@@ -57,3 +57,10 @@ class OdeReducer:
         """Constant friction of the nodes and its ratio to the torque passed on, two arrays of shape (NODES,)."""
         rest = 0.5 * (1.0 - self.first_load_share)
         return np.array([self.drag, 0.0, self.friction]), self.load_friction * np.array([self.first_load_share, rest, rest])
+
+    def carried(self):
+        """Torque in each mesh when T_r loads the output and all bristles are bent, shape (NODES,)."""
+        constant, ratio = self.levels()
+        first = (1.0 - constant[0]) / (1.0 + ratio[0])
+        second = (first - constant[1]) / (1.0 + ratio[1])
+        return np.array([first, second, (second - constant[2]) / (1.0 + ratio[2])])

@@ -10,7 +10,8 @@ import numpy as np
 from backdrive_bayes.bench.ode.drawing import log_uniform, sign
 from backdrive_bayes.bench.ode.effect import OdeEffect
 
-MOST_POINTS = 20000
+BEND = 1e-6
+"""Departure of the lagging angle from straight lines between its points, in angle scales."""
 
 
 @dataclass(frozen=True)
@@ -28,22 +29,27 @@ class SensorLag(OdeEffect):
         """Late angle."""
         if self.variant == "delay":
             return time_s + self.strength, angle
-        step = max(0.25 * self.strength, (time_s[-1] - time_s[0]) / MOST_POINTS)
-        fine = np.unique(np.concatenate([time_s, np.arange(time_s[0], time_s[-1], step)]))
-        late = _pole(fine, np.interp(fine, time_s, angle), self.share * self.strength)
-        return fine, (_pole(fine, late, (1.0 - self.share) * self.strength) if self.variant == "two poles" else late)
+        late = _pole(time_s, angle, self.share * self.strength)
+        return _pole(*late, (1.0 - self.share) * self.strength) if self.variant == "two poles" else late
 
 
 @numba.njit(cache=True)
 def _pole(time_s, signal, constant_s):
-    """First-order answer to a signal that is straight between its points, from rest."""
-    out = np.empty_like(signal)
-    out[0] = signal[0]
+    """Times and first-order answer to a signal that is straight between its points, from rest, with steps where it bends."""
+    times, out = [time_s[0]], [signal[0]]
     for k in range(1, time_s.size):
-        step = time_s[k] - time_s[k - 1]
-        keep, slope = np.exp(-step / constant_s), (signal[k] - signal[k - 1]) / step
-        out[k] = signal[k] - slope * constant_s + (out[k - 1] - signal[k - 1] + slope * constant_s) * keep
-    return out
+        whole = time_s[k] - time_s[k - 1]
+        slope = (signal[k] - signal[k - 1]) / whole
+        begin, settled = out[-1], signal[k - 1] - slope * constant_s
+        bent = min(whole, 12.0 * constant_s)
+        pieces = int(np.ceil(bent / constant_s * np.sqrt(abs(begin - settled) / (8.0 * BEND))))
+        for j in range(1, pieces):
+            late = bent * (j / pieces) ** 1.5
+            times.append(time_s[k - 1] + late)
+            out.append(settled + slope * late + (begin - settled) * np.exp(-late / constant_s))
+        times.append(time_s[k])
+        out.append(settled + slope * whole + (begin - settled) * np.exp(-whole / constant_s))
+    return np.array(times), np.array(out)
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,6 @@ def draw_offset(rng, reducer):
 
 
 def draw_encoder(rng, reducer):
-    """Five to sixty-odd periods in the measured range."""
+    """Three to forty periods in the measured range."""
     variant = str(rng.choice(["signals", "triangle", "harmonics"]))
-    return EncoderError(0.0, variant, log_uniform(rng, 0.03, 0.4), rng.uniform(0, 6.28), rng.uniform(0.0, 0.6))
+    return EncoderError(0.0, variant, log_uniform(rng, 0.05, 0.6), rng.uniform(0, 6.28), rng.uniform(0.0, 0.6))

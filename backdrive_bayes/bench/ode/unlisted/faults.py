@@ -14,10 +14,12 @@ from backdrive_bayes.bench.ode.integrate import follow
 
 @dataclass(frozen=True)
 class WarmingStiffness(OdeEffect):
-    """The shaft's compliance changes as the bench warms over ``scale_s``; strength is the whole change, in shares."""
+    """The shaft's compliance changes as the bench warms over ``scale_s``; strength is the logarithm of the whole change."""
 
     scale_s: float = 60.0
     direction: float = 1.0
+
+    most = 2.0
 
     def alter(self, run, chain):
         """The chain whose shaft can be modulated."""
@@ -28,7 +30,7 @@ class WarmingStiffness(OdeEffect):
     def widen(self, run, time_s):
         """Warming since switch-on."""
         late = np.maximum(run.bench_time_s(time_s), 0.0)
-        return -self.direction * self.strength * np.expm1(-late / self.scale_s)
+        return np.expm1(-self.direction * self.strength * np.expm1(-late / self.scale_s))
 
 
 @dataclass(frozen=True)
