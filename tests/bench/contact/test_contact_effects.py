@@ -47,6 +47,20 @@ def test_an_effect_is_absent_at_strength_0_and_grows_from_there(name):
     assert (np.diff(sizes) > 0).all() and sizes[0] < 0.05 * sizes[-1] + 1e-3
 
 
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("forth", [True, False])
+def test_effects_act_together_in_any_order(seed, forth):
+    rng = np.random.default_rng(seed)
+    reducer = MECHANICS.draw_reducer(rng, None, MEMBERS)
+    effects = [strong(draw(rng, reducer), 0.5) for draw in ALL.values()][:: 1 if forth else -1]
+    where = Circumstances(make_path(Loop(1.0, 0.2), reducer.rated_torque_nm, (1.0,)), 30.0)
+    time = np.linspace(0.0, where.path.end_s, 801)
+    whole = MECHANICS.angle(reducer, tuple(effects), where, time)
+    for k in range(len(effects)):
+        less = MECHANICS.angle(reducer, tuple(effects[:k] + effects[k + 1 :]), where, time)
+        assert np.isfinite(less).all() and np.std(whole - less) > 1e-6 * reducer.angle_rad, effects[k]
+
+
 @pytest.mark.parametrize("law", ["annulus", "ring", "ratchet"])
 def test_slip_begins_above_its_threshold_and_stays_until_reversed(law):
     reducer, effect = drawn("interface_slip", law=law, strength=0.05, threshold=0.7)

@@ -9,8 +9,6 @@ import numpy as np
 from backdrive_bayes.bench.contact.chain import Chain, contact_stiffness
 from backdrive_bayes.bench.contact.effect import ContactEffect
 
-_PER_FLANK = ("open_up", "open_down", "stiff_up", "stiff_down", "mu", "tangential")
-
 
 @dataclass(frozen=True)
 class HardeningStiffness(ContactEffect):
@@ -25,19 +23,28 @@ class HardeningStiffness(ContactEffect):
 
     def chain(self, test, chain):
         """Chain with hardening contacts."""
+        deflection = test.reducer.deflections()
         if self.law == "profile":
-            power = chain.power_up + 0.5 * self.strength
-            stiff = contact_stiffness(chain.open_up, power, chain.film, test.reducer.deflections())
-            return chain._replace(stiff_up=stiff, stiff_down=stiff, power_up=power, power_down=power)
-        return self._with_teeth(chain, test.reducer.deflections())
+            return self._rounder(chain, deflection)
+        return self._with_teeth(chain, deflection)
+
+    def _rounder(self, chain: Chain, deflection):
+        changed = {}
+        for side in ("up", "down"):
+            touch, stiff, power = (getattr(chain, f"{name}_{side}") for name in ("open", "stiff", "power"))
+            before, after = (contact_stiffness(touch, p, chain.film, deflection) for p in (power, power + 0.5 * self.strength))
+            changed |= {f"stiff_{side}": stiff * after / before, f"power_{side}": power + 0.5 * self.strength}
+        return chain._replace(**changed)
 
     def _with_teeth(self, chain: Chain, deflection):
         knees = np.array(self.knees if self.law == "teeth" else self.knees[:1])
-        late = chain.open_up.min(axis=1, keepdims=True) + deflection[:, None] * knees
-        stiff = np.broadcast_to(self.strength * chain.stiff_up.sum(axis=1, keepdims=True) / knees.size, late.shape)
-        bare = np.zeros_like(late)
-        more = {"open_up": late, "open_down": late, "stiff_up": stiff, "stiff_down": stiff, "mu": bare, "tangential": bare}
-        return chain._replace(**{name: np.hstack([getattr(chain, name), more[name]]) for name in _PER_FLANK})
+        bare = np.zeros((deflection.size, knees.size))
+        more = {"mu": bare, "tangential": bare}
+        for side in ("up", "down"):
+            touch, stiff = getattr(chain, f"open_{side}"), getattr(chain, f"stiff_{side}")
+            more[f"open_{side}"] = touch.min(axis=1, keepdims=True) + deflection[:, None] * knees
+            more[f"stiff_{side}"] = bare + self.strength * stiff.sum(axis=1, keepdims=True) / knees.size
+        return chain._replace(**{name: np.hstack([getattr(chain, name), added]) for name, added in more.items()})
 
 
 def draw(rng, reducer):

@@ -22,7 +22,9 @@ class LoadDependentFriction(ContactEffect):
         if self.flanks:
             # Flanks that barely grip tangentially would stay elastic; the grip only acts where there is friction.
             firm = chain.tangential * (1.0 + 10.0 * self.strength)
-            return chain._replace(mu=chain.mu + self.strength * test.reducer.flank_levels(), tangential=firm)
+            level, mu = test.reducer.flank_levels(), chain.mu.copy()
+            mu[:, : level.shape[1]] += self.strength * level
+            return chain._replace(mu=mu, tangential=firm)
         level = test.reducer.bearing_levels().sum(axis=1)
         reach = test.reducer.presliding * (1.0 + self.strength)
         more = (self.strength / reach) * test.reducer.bearing_levels()
