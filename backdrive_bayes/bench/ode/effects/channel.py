@@ -16,10 +16,10 @@ BEND = 1e-6
 
 @dataclass(frozen=True)
 class SensorLag(OdeEffect):
-    """The angle is late by a delay, or behind one or two poles; strength is the whole lag [s], ``share`` the first pole's."""
+    """The angle is late by a delay, or behind one or two poles; strength is the whole lag [s], ``share`` the first of two's."""
 
     variant: str = "delay"
-    share: float = 1.0
+    share: float = 0.7
 
     guess = 0.02
     most = 0.5
@@ -29,8 +29,9 @@ class SensorLag(OdeEffect):
         """Late angle."""
         if self.variant == "delay":
             return time_s + self.strength, angle
-        late = _pole(time_s, angle, self.share * self.strength)
-        return _pole(*late, (1.0 - self.share) * self.strength) if self.variant == "two poles" else late
+        if self.variant == "one pole":
+            return _pole(time_s, angle, self.strength)
+        return _pole(*_pole(time_s, angle, self.share * self.strength), (1.0 - self.share) * self.strength)
 
 
 @numba.njit(cache=True)
@@ -126,7 +127,7 @@ class EncoderError(OdeEffect):
 def draw_lag(rng, reducer):
     """A delay, one pole, or two."""
     variant = str(rng.choice(["delay", "one pole", "two poles"]))
-    return SensorLag(0.0, variant, rng.uniform(0.5, 0.85) if variant == "two poles" else 1.0)
+    return SensorLag(0.0, variant, rng.uniform(0.5, 0.85))
 
 
 def draw_drift(rng, reducer):
