@@ -22,14 +22,13 @@ HEIGHT = (0.02, 0.15)
 """Range of a trace's height (severity.py) at level 1, in noise standard deviations."""
 ABSORBED = 0.5
 """Largest height of a trace before anything of it is absorbed."""
-_PROBE = 0.1
-_FAR = 0.2
-"""Small effects are linear in strength, so that one evaluation tells it; one more where that is far below the first."""
+_PROBE, _ROUNDS, _NEAR = 0.1, 5, 0.25
+"""Small effects are nearly linear in strength, so that two evaluations mostly do; a trace that has none so small is left out."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A trace of an effect, with its height as far as the angle is linear in its strength."""
+    """A trace of an effect, with its height (severity.py)."""
 
     name: str
     effect: BenchEffect
@@ -44,17 +43,17 @@ def draw_soil(rng, yardstick: Yardstick, level: float, planted=()) -> tuple[Trac
 
 def _trace(rng, name, yardstick, level):
     effect = yardstick.mechanics.effects[name](rng, yardstick.reducer)
-    wanted, strength, height = level * rng.uniform(*HEIGHT), _PROBE * min(effect.guess, effect.most), 0.0
-    for _ in range(2):
+    wanted, strength = level * rng.uniform(*HEIGHT), _PROBE * min(effect.guess, effect.most)
+    for _ in range(_ROUNDS):
         change = yardstick.change((replace(effect, strength=strength),))
         height, whole = height_of(yardstick.beyond(change)), height_of(_without_means(change, len(yardstick.records)))
         if whole == 0.0:
-            return Trace(name, replace(effect, strength=0.0), 0.0)
-        times = min(wanted / max(height, 1e-12), level * ABSORBED / whole, effect.most / strength)
-        strength, height = float(times * strength), float(times * height)
-        if times > _FAR:
             break
-    return Trace(name, replace(effect, strength=strength), height)
+        times = min(wanted / max(height, 1e-12), level * ABSORBED / whole, effect.most / strength)
+        if abs(times - 1.0) < _NEAR:
+            return Trace(name, replace(effect, strength=strength), height)
+        strength = float(times * strength)
+    return Trace(name, replace(effect, strength=0.0), 0.0)
 
 
 def _without_means(change, records):

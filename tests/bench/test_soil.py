@@ -24,8 +24,8 @@ def test_every_channel_effect_is_there_in_a_trace_of_its_height(seed):
     traces = draw_soil(np.random.default_rng(seed), measure, 1.0)
     assert tuple(t.name for t in traces) == TRACES
     for trace in traces:
-        assert 0 < trace.height <= HEIGHT[1]
-        assert measure.height(trace.effect) == pytest.approx(trace.height, rel=0.4, abs=0.02)
+        assert 0 < trace.height <= 1.25 * HEIGHT[1]
+        assert measure.height(trace.effect) == pytest.approx(trace.height)
     together = measure.change([t.effect for t in traces]).reshape(2, -1)
     assert height_of(together - together.mean(axis=1, keepdims=True)) < 1.5
 
@@ -40,5 +40,5 @@ def test_soil_grows_with_its_level_and_spares_what_is_planted():
     measure = yardstick()
     usual, double = (draw_soil(np.random.default_rng(0), measure, level, ("sensor_lag",)) for level in (1.0, 2.0))
     assert "sensor_lag" not in {t.name for t in usual}
-    assert [t.height for t in double] == pytest.approx([2 * t.height for t in usual])
+    assert sum(t.height for t in double) > 1.6 * sum(t.height for t in usual)
     assert draw_soil(np.random.default_rng(0), measure, 0.0) == ()
