@@ -8,8 +8,8 @@ import numpy as np
 
 from backdrive_bayes.bench.plan import Path
 
-STEPS_PER_RATED = 700.0
-STEPS_NEAR_ZERO = 3500.0
+STEPS_PER_RATED = 800.0
+STEPS_NEAR_ZERO = 5000.0
 _NEAR = 0.12
 _HOLD_STEPS = 1500
 _LEVELS = np.linspace(-3.0, 3.0, 12001)

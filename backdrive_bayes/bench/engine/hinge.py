@@ -55,6 +55,7 @@ def _run(hinge, load_bytes, step_bytes):
             weight[2] = damping[i]
         step(model, data)
         found[i] = angle[0]
+    rows.raise_if_unstable(data)
     found.flags.writeable = False
     return found[rows.REST_STEPS :]
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
+import numba
 import numpy as np
 
-from backdrive_bayes.bench.engine.rows import REST_STEPS, load_engine, weight_of_dashpot
+from backdrive_bayes.bench.engine.rows import REST_STEPS, load_engine, raise_if_unstable, weight_of_dashpot
 from backdrive_bayes.bench.engine.train import Train, build_train
 
 
@@ -30,47 +32,60 @@ def _run(train, torque_bytes, step_bytes, floating):
     advance = _advance_with_extras if special else _advance
     step_s = np.r_[rest + 1.0, step_s] if step_s.size else np.ones(rest.size + torque.size)
     drag = np.outer(weight_of_dashpot(train.viscous / step_s), np.ones(len(dashpots))) if dashpots else None
-    return advance(train, model, data, np.r_[rest, torque], (dashpots, drag))[REST_STEPS:]
+    found = advance(train, model, data, np.r_[rest, torque], (dashpots, drag))[REST_STEPS:]
+    raise_if_unstable(data)
+    return found
 
 
 def _advance(train, model, data, torque, _):
     """Output angle at every step; bearing friction follows the torque that each body passes on."""
-    step, applied, angle = load_engine().mj_step, data.qfrc_applied, data.qpos
+    step, applied, angle, first = load_engine().mj_step, data.qfrc_applied, data.qpos, model.neq
     friction, constant, slope = model.dof_frictionloss, np.maximum(train.friction, 1e-9), np.array(train.load_friction)
-    found = np.empty(torque.size)
+    found, level = np.empty(torque.size), np.ones(constant.size)
     for i, load in enumerate(torque.tolist()):
         applied[0] = load
         step(model, data)
         found[i] = angle[0]
-        friction[:] = constant + slope * np.abs(_passed(data, load))
+        _press(friction, data.efc_force, first, load, constant, slope, level)
     return found
 
 
-def _passed(data, load):
-    """Torque that each body passes on to the next, from the bearing friction the solver found."""
-    return load + np.cumsum(data.efc_force[data.ne : data.ne + data.qpos.size])
+@numba.njit(cache=True)
+def _press(friction, row_force, first, load, constant, slope, level):
+    """Sets bearing friction by the torque that each body passes on; the solver's friction rows begin at ``first``."""
+    passed = load
+    for i in range(friction.size):
+        passed += row_force[first + i]
+        friction[i] = level[i] * (constant[i] + slope[i] * abs(passed))
 
 
 def _advance_with_extras(train, model, data, torque, drag):
     """As _advance, with static friction, bearing drag in true time, running-in and cogging."""
-    step, applied, angle, speed = load_engine().mj_step, data.qfrc_applied, data.qpos, data.qvel
-    constant, slope = np.maximum(train.friction, 1e-9), np.array(train.load_friction)
+    step, applied, angle, speed, first = load_engine().mj_step, data.qfrc_applied, data.qpos, data.qvel, model.neq
+    friction, constant, slope = model.dof_frictionloss, np.maximum(train.friction, 1e-9), np.array(train.load_friction)
     (depth, period, phase), (dashpots, weights) = train.cogging, drag
-    found, slid = np.empty(torque.size), np.zeros(constant.size)
-    sliding, drive = np.zeros(constant.size, bool), _drive_speed(train, torque)
+    found, drive = np.empty(torque.size), _drive_speed(train, torque).tolist()
+    level, slid, sliding = np.ones(constant.size), np.zeros(constant.size), np.zeros(constant.size, np.bool_)
     for i, load in enumerate(torque.tolist()):
-        applied[0] = load - depth * np.sin(2.0 * np.pi * angle[0] / period + phase)
+        applied[0] = load - depth * math.sin(2.0 * math.pi * angle[0] / period + phase)
         if dashpots:
             model.tendon_invweight0[dashpots] = weights[i]
         step(model, data)
         found[i] = angle[0]
-        moved = np.abs(speed)
-        slid += moved
-        # A bearing that has broken loose slides on until it is no faster than the load drives it.
-        sliding = np.where(sliding, moved > 3.0 * drive[i], moved > 0.05 * drive[i])
-        level = 1.0 + train.static * ~sliding - train.running_in * (1.0 - np.exp(-slid / 3.0))
-        model.dof_frictionloss[:] = level * (constant + slope * np.abs(_passed(data, load)))
+        _wear(level, slid, sliding, speed, drive[i], train.static, train.running_in)
+        _press(friction, data.efc_force, first, load, constant, slope, level)
     return found
+
+
+@numba.njit(cache=True)
+def _wear(level, slid, sliding, speed, drive, static, running_in):
+    """Updates each bearing's friction level: static or kinetic, and run in by what it has slid so far."""
+    for i in range(level.size):
+        moved = abs(speed[i])
+        slid[i] += moved
+        # A bearing that has broken loose slides on until it is no faster than the load drives it.
+        sliding[i] = moved > (3.0 if sliding[i] else 0.05) * drive
+        level[i] = 1.0 + (0.0 if sliding[i] else static) - running_in * (1.0 - np.exp(-slid[i] / 3.0))
 
 
 def _drive_speed(train, torque):
