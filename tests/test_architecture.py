@@ -36,7 +36,7 @@ FORBIDDEN = {
     "figures": {"records", "model", "inference", "indicators", "decisions", "bench", "gap", "blind"},
     "report": {"records", "model", "inference", "indicators", "decisions", "bench", "gap", "blind"},
 }
-HEAVY = ("matplotlib", "corner", "typst", "dask", "pyarrow", "nptdms")
+HEAVY = ("matplotlib", "corner", "typst", "dask", "pyarrow", "nptdms", "openpyxl", "asammdf")
 
 
 def module_name(path):
@@ -132,7 +132,8 @@ def test_emcee_is_known_to_one_module():
 
 @pytest.mark.parametrize("library", HEAVY)
 def test_optional_libraries_stay_out_of_the_core(library):
-    at_home = {"pyarrow": {"records"}, "nptdms": {"records"}}.get(library, {"figures", "report", "commands"})
+    readers = {"pyarrow", "nptdms", "openpyxl", "asammdf"}
+    at_home = {"records"} if library in readers else {"figures", "report", "commands"}
     assert {room(m) for m in importers_of(library)} <= at_home
 
 

@@ -76,6 +76,18 @@ def split_unit(spelling: str) -> tuple[str, str]:
     return (name, unit) if name else (spelling, "")
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of time, torque or angle."""
+    return any(_canonical(text) in units for units in UNITS.values())
+
+
+def labelled(name: str, unit: str | None) -> str:
+    """A channel's name with its unit in brackets, unless the name brings a unit of its own or there is none."""
+    if not unit or _BRACKETS.match(name) or is_unit(split_unit(name)[1]):
+        return name
+    return f"{name} [{unit.strip()}]"
+
+
 def find_column(headers: tuple[str, ...], kind: str, asked: str | None, where: str) -> tuple[str, Quantity]:
     """Find the header that holds a quantity, and the unit in which it is written.
 

@@ -1,6 +1,7 @@
 """Every kind of bad input: exit code 2, one line on standard error, no traceback, nothing written."""
 
 import gzip
+import json
 import lzma
 import os
 import subprocess
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import answer, ramps, write_csv
 
+from backdrive_bayes.commands.door import collected, ready_unit
 from backdrive_bayes.commands.main import main
 from backdrive_bayes.commands.output import default_out, write_folder, write_json
 from backdrive_bayes.records.readers import limits
@@ -100,7 +102,36 @@ def other_mat(folder):
     edit_toml(folder, "a.csv", "a.mat")
 
 
+def renamed(suffix):
+    return lambda folder: (os.rename(folder / "a.csv", folder / f"a.{suffix}"), edit_toml(folder, "a.csv", f"a.{suffix}"))
+
+
+def flipped_mat(folder):
+    from scipy.io import savemat
+
+    savemat(folder / "a.mat", {"time_s": TIME, "torque_Nm": TORQUE, "angle_arcmin": ANGLE})
+    data = bytearray((folder / "a.mat").read_bytes())
+    data[150:170] = b"\xff" * 20
+    (folder / "a.mat").write_bytes(data)
+    edit_toml(folder, "a.csv", "a.mat")
+
+
 CASES = {
+    "not Excel": (renamed("xlsx"), ["Excel workbook"]),
+    "not MDF": (renamed("mf4"), ["MDF file"]),
+    "flipped bytes in MAT": (flipped_mat, ["MATLAB"]),
+    "integer of 309 digits": (lambda f: edit_toml(f, "= 1.0", "= 1" + "0" * 308), ["at most 300 digits"]),
+    "integer of 5000 digits": (lambda f: edit_toml(f, "= 1.0", "= 1" + "0" * 5000), ["valid TOML"]),
+    "hexadecimal integer of 9000 digits": (lambda f: edit_toml(f, "= 1.0", "= 0x1" + "0" * 9000), ["at most 300 digits"]),
+    "20 000 tables": (
+        lambda f: edit_toml(f, "= 1.0", "= 1.0\n" + "[[loop_area_J]]\nmax = 1\n" * 20_000),
+        ["at most 1000 entries", "20000"],
+    ),
+    "deep dotted key": (lambda f: edit_toml(f, "= 1.0", "= 1.0\n" + ".".join("a" * 900) + " = 1"), ["40 tables"]),
+    "numbers of 1e308": (lambda f: rewrite(f, torque=1e307 * TORQUE.round(3)), ["below 1e+60"]),
+    "years between samples": (lambda f: rewrite(f, time=1e9 * TIME), ["microseconds to years"]),
+    "20 samples": (lambda f: rewrite(f, TIME[::50], TORQUE[::50], ANGLE[::50]), ["24 samples or more", "found 21"]),
+    "12 samples": (lambda f: rewrite(f, TIME[:12], TORQUE[:12], ANGLE[:12]), ["24 samples or more", "found 12"]),
     "missing record file": (missing_file, ["unit.toml", "record 1", "a.csv", "nothing there"]),
     "missing unit file": (lambda f: (f / "unit.toml").unlink(), ["unit.toml"]),
     "missing key": (
@@ -135,8 +166,8 @@ CASES = {
     "link that leaves": (outward_link, ["inside the unit folder", "link"]),
     "NUL in path": (lambda f: edit_toml(f, "a.csv", "a\\u0000.csv"), ["key file"]),
     "unknown format": (
-        lambda f: (os.rename(f / "a.csv", f / "a.xlsx"), edit_toml(f, "a.csv", "a.xlsx")),
-        ["a.xlsx", ".parquet"],
+        lambda f: (os.rename(f / "a.csv", f / "a.ods"), edit_toml(f, "a.csv", "a.ods")),
+        ["a.ods", ".parquet"],
     ),
     "unknown unit": (
         lambda f: rewrite(f, header="time_s,torque_lbf,angle_arcmin"),
@@ -206,6 +237,88 @@ def test_bad_unit_is_one_line_and_nothing_is_written(case, unit_folder, tmp_path
     assert all(words in line for words in said), line
     assert "expected" in line and "found" in line
     assert sorted(tmp_path.rglob("*")) == before
+
+
+UNFIT = {
+    "half a cycle": (lambda f: rewrite(f, TIME[:400], TORQUE[:400], ANGLE[:400]), "no_cycle"),
+    "quarter to quarter": (lambda f: rewrite(f, TIME[200:600], TORQUE[200:600], ANGLE[200:600]), "no_cycle"),
+    "inverted": (lambda f: rewrite(f, angle=-ANGLE), "angle_inverted"),
+    "frozen": (lambda f: rewrite(f, angle=np.where(TIME > 2, ANGLE[400], ANGLE)), "frozen"),
+    "slipped": (lambda f: rewrite(f, angle=ANGLE + 1000 * (TIME > 2.5)), "angle_not_answering"),
+    "time reversed": (lambda f: rewrite(f, torque=TORQUE[::-1], angle=ANGLE[::-1]), "loop_reversed"),
+    "few samples": (lambda f: rewrite(f, TIME[::25], TORQUE[::25], ANGLE[::25]), "few_samples"),
+}
+
+
+@pytest.mark.parametrize("case", UNFIT)
+def test_check_ends_with_2_on_errors_and_writes_what_it_found(case, unit_folder, tmp_path, capsys):
+    spoil, code = UNFIT[case]
+    spoil(unit_folder)
+    assert main(["check", str(unit_folder), "-o", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr()
+    found = json.loads((tmp_path / "out" / "check.json").read_text())
+    row = next(row for row in found["findings"] if row["level"] == "error" and row["code"] == code)
+    assert row["record"] == "a.csv" and not found["may_infer"]
+    assert row["text"] in said.out and row["text"] in said.err and said.err.count("\n") == 1
+    assert {"level": "error", "text": f"a.csv: {row['text']}"} in found["messages"]
+
+
+LIMITS = "[loop_area_J]\nmax = 1.0\n"
+
+
+@pytest.mark.parametrize("verb", ["fit", "diagnose", "accept", "compare"])
+def test_every_verb_refuses_unfit_data(verb, unit_folder, tmp_path, capsys):
+    rewrite(unit_folder, angle=-ANGLE)
+    (tmp_path / "limits.toml").write_text(LIMITS)
+    more = {"accept": ["--limits", str(tmp_path / "limits.toml")], "compare": [str(unit_folder)]}.get(verb, [])
+    assert main([verb, str(unit_folder), *more, "-o", str(tmp_path / "out")]) == 2
+    line = one_line(capsys)
+    assert "--force" in line and 'angle = "-angle_arcmin"' in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_force_goes_on_and_says_so(unit_folder, capsys):
+    rewrite(unit_folder, angle=-ANGLE)
+    ready = ready_unit(unit_folder, force=True)
+    said = capsys.readouterr().out
+    assert "forced: the data are unfit" in said and "error: a.csv: the angle falls" in said
+    result = ready.stamp({"unit": "u"})
+    assert result["forced"] is True and result["findings"][0]["code"] == "angle_inverted"
+    assert collected([result])["forced"] and collected([result])["findings"][0]["unit"] == "u"
+
+
+def test_warnings_are_repeated_and_kept(unit_folder, capsys):
+    edit_toml(unit_folder, "= 1.0", "= 100.0")
+    ready = ready_unit(unit_folder)
+    said = capsys.readouterr().out
+    assert "warning: the largest torque tested" in said and "lost motion is not defined" in said
+    assert not ready.stamp({})["forced"]
+    assert "lost motion is not defined" not in str(ready_unit(unit_folder, k=0.005).lines)
+
+
+def test_what_force_cannot_mend_is_one_line(unit_folder, tmp_path, capsys, monkeypatch):
+    def fail(*_, **__):
+        raise ValueError("no blocks")
+
+    rewrite(unit_folder, TIME[:400], TORQUE[:400], ANGLE[:400])
+    monkeypatch.setattr("backdrive_bayes.commands.fit.fit_unit", fail)
+    assert main(["fit", str(unit_folder), "--force", "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "even with --force (no blocks)" in error
+
+
+@pytest.mark.parametrize("argv", [["check", "a\0b"], ["check", "x", "-o", "a\0b"], ["report", "x\0"]])
+def test_a_name_with_nul_is_one_line(argv, capsys):
+    assert main(argv) == 2
+    assert "without NUL" in one_line(capsys)
+
+
+def test_deep_json_is_one_line(tmp_path, capsys):
+    (tmp_path / "indicators.json").write_text("[" * 200_000)
+    (tmp_path / "posterior.nc").write_bytes(b"x")
+    (tmp_path / "limits.toml").write_text(LIMITS)
+    assert main(["accept", str(tmp_path), "--limits", str(tmp_path / "limits.toml")]) == 2
+    assert "nested too deeply" in one_line(capsys)
 
 
 def test_row_bound_holds_for_every_format(unit_folder, capsys, monkeypatch):

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import warnings
 from pathlib import Path
 
-from backdrive_bayes.errors import BadInput
+from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.records.readers.limits import Choose, Columns, check_file_size
 
 READERS = {
     ".csv": "csv_file",
     ".csv.gz": "csv_file",
     ".csv.xz": "csv_file",
+    ".xlsx": "xlsx_file",
     ".parquet": "parquet_file",
     ".tdms": "tdms_file",
     ".mat": "mat_file",
+    ".mf4": "mdf_file",
 }
 
 
@@ -36,4 +39,12 @@ def read_columns(path: Path, choose: Choose) -> Columns:
         raise BadInput(path, f"a file ending in {', '.join(READERS)}", f"'{path.name}'")
     check_file_size(path)
     reader = importlib.import_module(f"{__name__}.{READERS[suffix]}")
-    return reader.read(path, choose)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a parser's doubts about styles or dates are no concern of the user's
+            return reader.read(path, choose)
+    except (BadInput, MissingExtra, MemoryError):
+        raise
+    # Parsers of foreign formats raise whatever they stumble over in damaged bytes.
+    except Exception as error:
+        raise BadInput(path, f"a readable {suffix} file", f"{type(error).__name__} {str(error)[:120]}".strip()) from error

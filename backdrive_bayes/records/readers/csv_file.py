@@ -4,34 +4,44 @@ from __future__ import annotations
 
 import csv
 import io
-import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.records.readers.csv_culprit import culprit, too_long
 from backdrive_bayes.records.readers.inflate import BoundedStream
 from backdrive_bayes.records.readers.limits import Choose, Columns, check_rows
+from backdrive_bayes.records.readers.table_head import MOST_HEAD_ROWS, TableHead, find_head
 
 _HEAD_BYTES = 1 << 16
 _CHUNK_ROWS = 500_000
+_SEPARATORS = (";", "\t", ",")
+_SEPARATOR_LINE = re.compile(r'"?sep=([;,\t])"?', re.IGNORECASE)
+_LINE_END = re.compile("\r\n|\n|\r")
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
 @dataclass(frozen=True)
-class _Dialect:
-    """How a file is written: text encoding, separator, decimal mark, and the names in its first row."""
+class Dialect:
+    """How a file is written: text encoding, separator, decimal mark, names of the columns, lines above the first sample.
+
+    ``marks_above`` counts the separators in those lines.
+    """
 
     encoding: str
     separator: str
     decimal: str
     headers: tuple[str, ...]
     notes: tuple[str, ...]
+    lines_above: int = 1
+    marks_above: int = 0
 
 
 def read(path: Path, choose: Choose) -> Columns:
-    """Read the chosen columns; the header is row 1 and samples start at row 2.
+    """Read the chosen columns; the header is row 1, or stands below a preamble and above a row of units.
 
     Separators are comma, semicolon or tab; decimal commas are read where the separator leaves no doubt. Text
     goes through the C parser in bounded chunks; only when that fails is the file searched line by line for
@@ -48,15 +58,15 @@ def read(path: Path, choose: Choose) -> Columns:
         OverflowError,
     ) as error:  # the parser's errors are ValueErrors and do not name the row
         fallback = BadInput(path, "columns of finite numbers", str(error))
-        raise _culprit(path, dialect, wanted) or fallback from error
+        raise culprit(path, dialect, wanted) or fallback from error
     finite = all(np.isfinite(value).all() for value in values)
-    error = None if even and finite else _culprit(path, dialect, wanted)
+    error = None if even and finite else culprit(path, dialect, wanted)
     if error is not None or not finite:
         raise error or BadInput(path, "columns of finite numbers", "a value that is not")
-    return Columns(tuple(values), first_row=2, notes=dialect.notes)
+    return Columns(tuple(values), first_row=dialect.lines_above + 1, notes=dialect.notes)
 
 
-def _parse(path: Path, dialect: _Dialect, wanted: list[str]) -> tuple[list[np.ndarray], bool]:
+def _parse(path: Path, dialect: Dialect, wanted: list[str]) -> tuple[list[np.ndarray], bool]:
     """Columns, and whether the separators in the file are as many as rows of equal length need.
 
     The parser drops surplus fields in silence; a decimal comma would shift the columns unseen.
@@ -69,7 +79,7 @@ def _parse(path: Path, dialect: _Dialect, wanted: list[str]) -> tuple[list[np.nd
         decimal=dialect.decimal,
         encoding=dialect.encoding,
         header=None,
-        skiprows=1,
+        skiprows=dialect.lines_above,
         usecols=sorted(set(positions)),
         dtype=np.float64,
         engine="c",
@@ -85,8 +95,8 @@ def _parse(path: Path, dialect: _Dialect, wanted: list[str]) -> tuple[list[np.nd
     if not chunks:
         raise BadInput(path, "samples below the header", "none")
     values = _without_trailing_blanks([np.concatenate(parts) for parts in zip(*chunks, strict=True)])
-    needed = (len(dialect.headers) - 1) * (len(values[0]) + 1)
-    return values, stream.seen == needed
+    needed = (len(dialect.headers) - 1) * len(values[0])
+    return values, stream.seen - dialect.marks_above == needed
 
 
 def _without_trailing_blanks(values: list[np.ndarray]) -> list[np.ndarray]:
@@ -96,27 +106,47 @@ def _without_trailing_blanks(values: list[np.ndarray]) -> list[np.ndarray]:
     return [value[: filled[-1] + 1 if filled.size else 0] for value in values]
 
 
-def _sniff(path: Path) -> _Dialect:
+def _sniff(path: Path) -> Dialect:
     with BoundedStream(path) as stream:
         head = io.BufferedReader(stream, _HEAD_BYTES).read(_HEAD_BYTES)
     encoding, notes = _encoding(path, head)
-    lines = [line for line in head.decode(encoding, errors="replace").splitlines() if line]
-    if len(lines) < 2:
-        raise BadInput(path, "a header and samples", f"{len(lines)} line{'s'[: len(lines) != 1]}")
+    lines = _LINE_END.split(head.decode(encoding, errors="replace"))
     if len(head) == _HEAD_BYTES:
         lines.pop()
-    if len(lines) < 2:
-        raise BadInput(path, "lines of text", f"a first line longer than {_HEAD_BYTES} bytes")
-    separator = max(",;\t", key=lines[0].count)
-    headers = tuple(name.strip() for name in next(csv.reader([lines[0]], delimiter=separator)))
-    if separator not in lines[0]:
-        raise BadInput(f"{path}, row 1", "columns separated by comma, semicolon or tab", f"'{lines[0][:60]}'")
-    first = next(csv.reader([lines[1]], delimiter=separator))
-    if any(first[len(headers) :]):
-        raise _too_long(f"{path}, row 2", separator, len(headers), len(first))
-    body = "".join(lines[1:])
+        if len([line for line in lines if line]) < 2:
+            raise BadInput(path, "lines of text", f"a line longer than {_HEAD_BYTES} bytes")
+    if (filled := len([line for line in lines if line])) < 2:
+        raise BadInput(path, "a header and samples", f"{filled} line{'s'[: filled != 1]}")
+    separator, found = _table(path, lines)
+    first = next(csv.reader([lines[found.first_row]], delimiter=separator), [])
+    if any(first[len(found.names) :]):
+        raise too_long(f"{path}, row {found.first_row + 1}", separator, len(found.names), len(first))
+    body = "".join(lines[found.first_row :])
     decimal = "," if separator != "," and body.count(",") > body.count(".") else "."
-    return _Dialect(encoding, separator, decimal, headers, notes)
+    marks = sum(line.count(separator) for line in lines[: found.first_row])
+    return Dialect(encoding, separator, decimal, found.names, notes + found.notes, found.first_row, marks)
+
+
+def _table(path: Path, lines: list[str]) -> tuple[str, TableHead]:
+    """Separator and head of a table in text; the separator is the one that gives most columns, unless the file names it."""
+    named = _SEPARATOR_LINE.fullmatch(lines[0].strip())
+    start = 1 if named else 0
+    heads = {mark: find_head(_cells(lines[:start], lines[start:], mark)) for mark in ([named[1]] if named else _SEPARATORS)}
+    separator, found = max(heads.items(), key=lambda item: len(item[1].names) if item[1] else 0)
+    if found is not None:
+        return separator, found
+    row = next(i for i, line in enumerate(lines) if i >= start and line)
+    separator = named[1] if named else max(",;\t", key=lines[row].count)
+    if separator not in lines[row]:
+        expected = "columns separated by comma, semicolon or tab"
+        raise BadInput(f"{path}, row {row + 1}", expected, f"'{lines[row][:60]}'")
+    names = next(csv.reader([lines[row]], delimiter=separator))
+    return separator, TableHead(tuple(name.strip() for name in names), min(row + 1, len(lines) - 1))
+
+
+def _cells(above: list[str], lines: list[str], separator: str) -> list[list[str]]:
+    lines = lines[:MOST_HEAD_ROWS]
+    return [[] for _ in above] + [next(csv.reader([line], delimiter=separator), []) for line in lines]
 
 
 def _encoding(path: Path, head: bytes) -> tuple[str, tuple[str, ...]]:
@@ -130,50 +160,3 @@ def _encoding(path: Path, head: bytes) -> tuple[str, tuple[str, ...]]:
     except UnicodeDecodeError:
         return "cp1252", ("text is not UTF-8: read as Windows-1252",)
     return "utf-8", ()
-
-
-def _culprit(path: Path, dialect: _Dialect, wanted: list[str]) -> BadInput | None:
-    """Search the file for the first row that cannot be used and say what is wrong with it."""
-    columns = [(name, dialect.headers.index(name)) for name in wanted]
-    empty = None
-    with BoundedStream(path) as stream:
-        text = io.TextIOWrapper(io.BufferedReader(stream), dialect.encoding, errors="replace", newline="")
-        try:
-            for row, cells in enumerate(csv.reader(text, delimiter=dialect.separator), start=1):
-                if not any(cells):
-                    empty = empty or row  # harmless at the end of the file
-                elif row > 1 and empty:
-                    return BadInput(f"{path}, row {empty}", f"{len(dialect.headers)} values", "an empty row")
-                elif row > 1 and (error := _row_error(path, dialect, columns, row, cells)):
-                    return error
-        except csv.Error as error:
-            return BadInput(path, "readable rows", str(error))
-    return None
-
-
-def _row_error(path: Path, dialect: _Dialect, columns, row: int, cells: list[str]) -> BadInput | None:
-    where = f"{path}, row {row}"
-    if any(cells[len(dialect.headers) :]):
-        return _too_long(where, dialect.separator, len(dialect.headers), len(cells))
-    for name, position in columns:
-        cell = cells[position].strip() if position < len(cells) else ""
-        if not _is_finite(cell, dialect.decimal):
-            mixed = _is_finite(cell, ",") or _is_finite(cell, ".")
-            hint = f" (the file's decimal mark is '{dialect.decimal}')" if mixed else ""
-            found = f"'{cell[:40]}'{hint}" if cell else "nothing"
-            return BadInput(f"{where}, column '{name}'", "a finite number", found)
-    return None
-
-
-def _too_long(where: str, separator: str, expected: int, found: int) -> BadInput:
-    hint = " (decimal commas with a comma as separator?)" if separator == "," else ""
-    return BadInput(where, f"{expected} values", f"{found}{hint}")
-
-
-def _is_finite(cell: str, decimal: str) -> bool:
-    if decimal == ",":
-        cell = cell.translate({ord(","): ".", ord("."): ","})
-    try:
-        return math.isfinite(float(cell)) and "_" not in cell
-    except ValueError:
-        return False
