@@ -19,7 +19,7 @@ class AsymmetricStiffness(ContactEffect):
     law: str
 
     guess = 0.1
-    most = 1.5
+    most = 3.0
 
     def chain(self, test, chain):
         """Contacts with one side changed."""

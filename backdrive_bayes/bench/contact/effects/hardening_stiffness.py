@@ -19,7 +19,7 @@ class HardeningStiffness(ContactEffect):
     knees: tuple[float, ...]
 
     guess = 0.1
-    most = 4.0
+    most = 8.0
 
     def chain(self, test, chain):
         """Chain with hardening contacts."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from backdrive_bayes.bench.contact.effect import ContactEffect
 
 
@@ -25,12 +27,15 @@ class LoadDependentFriction(ContactEffect):
             level, mu = test.reducer.flank_levels(), chain.mu.copy()
             mu[:, : level.shape[1]] += self.strength * level
             return chain._replace(mu=mu, tangential=firm)
-        level = test.reducer.bearing_levels().sum(axis=1)
-        reach = test.reducer.presliding * (1.0 + self.strength)
-        more = (self.strength / reach) * test.reducer.bearing_levels()
-        return chain._replace(bearing_load=self.strength * level, bearing_onset=self.onset, bristle=chain.bristle + more)
+        # The output bearing takes most of the load; a stage further in turns faster under less of it.
+        level = 0.4 ** np.arange(test.reducer.stages)
+        level /= level.sum()
+        firm = level[:, None] / chain.bristle.shape[1] / test.reducer.presliding
+        return chain._replace(
+            bearing_load=self.strength * level, bearing_onset=self.onset, bristle=chain.bristle + self.strength * firm
+        )
 
 
 def draw(rng, reducer):
     """At the flanks or in the bearings, these from no load on or from a preload on."""
-    return LoadDependentFriction(0.0, bool(rng.integers(2)), float(rng.choice([0.0, rng.uniform(0.05, 0.2)])))
+    return LoadDependentFriction(0.0, bool(rng.integers(2)), float(rng.choice([0.0, rng.uniform(0.03, 0.1)])))

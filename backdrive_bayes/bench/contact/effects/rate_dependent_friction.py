@@ -45,6 +45,6 @@ class RateDependentFriction(ContactEffect):
 
 def draw(rng, reducer):
     """Three laws, both signs; bearings alone, flanks alone, or both."""
-    law, where = str(rng.choice(["film", "stribeck", "viscous"])), int(rng.integers(3))
+    law, where = str(rng.choice(["film", "stribeck", "viscous"])), int(rng.choice(3, p=[0.2, 0.2, 0.6]))
     flanks = where != 0 and reducer.flank_friction > 0.0
     return RateDependentFriction(0.0, law, sign(rng), log_uniform(rng, 0.2, 0.6), flanks, where != 1 or not flanks)
