@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from backdrive_bayes.bench.benches import BENCHES
+from backdrive_bayes.bench.registry import EFFECTS
 from backdrive_bayes.commands.main import main
 from backdrive_bayes.records.unit_folder import read_unit
 
@@ -36,6 +38,23 @@ def test_the_truth_goes_only_where_asked(tmp_path):
     assert json.loads(truth.read_text())["answer"] == ["encoder_error"]
 
 
+def test_another_bench_is_another_reducer(tmp_path):
+    names = {}
+    for bench in ("sliders", "ode"):
+        truth = tmp_path / f"{bench}.json"
+        assert run("--bench", bench, "--effect", "sensor_lag", "-o", tmp_path / bench, "--truth", truth) == 0
+        names[bench] = json.loads(truth.read_text())
+    assert names["ode"]["bench"] == "ode" and set(names["ode"]["reducer"]) != set(names["sliders"]["reducer"])
+    assert len(names["ode"]["held"]["angle_rad"]) > 800
+
+
+def test_help_lists_effects_and_benches(capsys):
+    assert main(["simulate", "--help"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert all(f"{name} ({words})" in shown for name, words in EFFECTS.items())
+    assert all(name in shown for name in BENCHES) and "default 1" in shown
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -54,6 +73,7 @@ def test_the_truth_goes_only_where_asked(tmp_path):
         ["--cycles", "1.5"],
         ["--cycles", "0"],
         ["--kind", "round"],
+        ["--bench", "cardboard"],
         ["--soil", "-1"],
         ["--seed", "-1"],
         ["--truth", "OUT/truth.json"],
