@@ -78,16 +78,17 @@ def make_yardstick(mechanics: Mechanics, reducer, records, noise: ChannelNoise, 
 
 def scale_to(effect: BenchEffect, yardstick: Yardstick, height: float, rounds: int = 14) -> BenchEffect:
     """The effect at the strength that gives this height, or at its largest physical strength where that gives less."""
-    low, high, strength = 0.0, effect.most, min(effect.guess, effect.most)
+    low, high, strength, closest = 0.0, None, min(effect.guess, effect.most), (np.inf, 0.0)
     for k in range(rounds if height > 0.0 else 0):
         found = yardstick.height(replace(effect, strength=strength))
+        closest = min(closest, (abs(np.log(max(found, 1e-9) / height)), strength))
         if abs(found / height - 1.0) < 0.04 or (found < height and strength == effect.most):
-            return replace(effect, strength=float(strength))
+            break
         low, high = (strength, high) if found < height else (low, strength)
-        strength *= float(np.clip(height / max(found, 1e-9), 0.1, 10.0))
-        if not low < strength < high or k > rounds // 2:
-            strength = effect.most if high == effect.most else 0.5 * (low + high)
-    return replace(effect, strength=0.0 if height == 0.0 else float(0.5 * (low + high)))
+        strength = min(strength * float(np.clip(height / max(found, 1e-9), 0.1, 10.0)), effect.most)
+        if high is not None and (not low < strength < high or k > rounds // 2):
+            strength = 0.5 * (low + high)
+    return replace(effect, strength=float(closest[1]))
 
 
 def coarse_times(where: Circumstances):
