@@ -19,7 +19,10 @@ class Course:
         return self.law(effect.strength)
 
 
-@pytest.mark.parametrize("law", [lambda s: 40 * s, lambda s: 1e4 * s, lambda s: 120 * s**2, lambda s: 100 * max(s - 0.1, 0.01 * s)])
+LAWS = [lambda s: 40 * s, lambda s: 1e4 * s, lambda s: 120 * s**2, lambda s: 100 * max(s - 0.1, 0.01 * s)]
+
+
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("guess", [0.001, 0.1, 1.0])
 @pytest.mark.parametrize("height", [0.5, 5.0, 12.0])
 def test_a_height_is_met(law, guess, height):
