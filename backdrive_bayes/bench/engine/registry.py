@@ -24,13 +24,13 @@ EFFECTS = {
 
 UNLISTED = {
     "cogging": unlisted_reducer.draw_cogging,
-    "running_in": unlisted_reducer.draw_running_in,
+    "mount_jump": unlisted_channel.draw_mount_jump,
     "lift_off": unlisted_reducer.draw_lift_off,
-    "warm_stiffness": unlisted_reducer.draw_warm_stiffness,
+    "angle_scale": unlisted_channel.draw_angle_scale,
+    "sensor_gain": unlisted_channel.draw_sensor_gain,
     "tooth_defect": unlisted_reducer.draw_tooth_defect,
     "mains_hum": unlisted_channel.draw_mains_hum,
-    "mount_jump": unlisted_channel.draw_mount_jump,
-    "angle_scale": unlisted_channel.draw_angle_scale,
+    "warm_stiffness": unlisted_reducer.draw_warm_stiffness,
     "sensor_hysteresis": unlisted_channel.draw_sensor_hysteresis,
-    "sensor_gain": unlisted_channel.draw_sensor_gain,
+    "running_in": unlisted_reducer.draw_running_in,
 }

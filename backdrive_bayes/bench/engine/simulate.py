@@ -41,22 +41,26 @@ def _advance(train, model, data, torque, _):
     """Output angle at every step; bearing friction follows the torque that each body passes on."""
     step, applied, angle, first = load_engine().mj_step, data.qfrc_applied, data.qpos, model.neq
     friction, constant, slope = model.dof_frictionloss, np.maximum(train.friction, 1e-9), np.array(train.load_friction)
-    found, level = np.empty(torque.size), np.ones(constant.size)
+    found, level, stuck = np.empty(torque.size), np.ones(constant.size), np.zeros(constant.size)
     for i, load in enumerate(torque.tolist()):
         applied[0] = load
         step(model, data)
         found[i] = angle[0]
-        _press(friction, data.efc_force, first, load, constant, slope, level)
+        _press(friction, data.efc_force, first, load, constant, slope, level, stuck)
     return found
 
 
 @numba.njit(cache=True)
-def _press(friction, row_force, first, load, constant, slope, level):
-    """Sets bearing friction by the torque that each body passes on; the solver's friction rows begin at ``first``."""
-    passed = load
+def _press(friction, row_force, first, load, constant, slope, level, stuck):
+    """Sets bearing friction by the torque that each body passes on; the solver's friction rows begin at ``first``.
+
+    Stuck bearings have more of it where the load is above what friction alone carries and squeezes out the lubricant.
+    """
+    passed, light = load, 2.0 * constant.sum()
     for i in range(friction.size):
         passed += row_force[first + i]
-        friction[i] = level[i] * (constant[i] + slope[i] * abs(passed))
+        squeezed = 1.0 - (light / passed) ** 2 if abs(passed) > light else 0.0
+        friction[i] = (level[i] + stuck[i] * squeezed) * (constant[i] + slope[i] * abs(passed))
 
 
 def _advance_with_extras(train, model, data, torque, drag):
@@ -65,27 +69,29 @@ def _advance_with_extras(train, model, data, torque, drag):
     friction, constant, slope = model.dof_frictionloss, np.maximum(train.friction, 1e-9), np.array(train.load_friction)
     (depth, period, phase), (dashpots, weights) = train.cogging, drag
     found, drive = np.empty(torque.size), _drive_speed(train, torque).tolist()
-    level, slid, sliding = np.ones(constant.size), np.zeros(constant.size), np.zeros(constant.size, np.bool_)
+    level = np.ones(constant.size)
+    stuck, slid, sliding = np.zeros((3, constant.size))
     for i, load in enumerate(torque.tolist()):
         applied[0] = load - depth * math.sin(2.0 * math.pi * angle[0] / period + phase)
         if dashpots:
             model.tendon_invweight0[dashpots] = weights[i]
         step(model, data)
         found[i] = angle[0]
-        _wear(level, slid, sliding, speed, drive[i], train.static, train.running_in)
-        _press(friction, data.efc_force, first, load, constant, slope, level)
+        _slide(level, stuck, slid, sliding, speed, drive[i], train.static, train.running_in)
+        _press(friction, data.efc_force, first, load, constant, slope, level, stuck)
     return found
 
 
 @numba.njit(cache=True)
-def _wear(level, slid, sliding, speed, drive, static, running_in):
-    """Updates each bearing's friction level: static or kinetic, and run in by what it has slid so far."""
+def _slide(level, stuck, slid, sliding, speed, drive, static, running_in):
+    """Updates each bearing's friction level by what it has slid so far, and its static excess."""
     for i in range(level.size):
         moved = abs(speed[i])
         slid[i] += moved
         # A bearing that has broken loose slides on until it is no faster than the load drives it.
         sliding[i] = moved > (3.0 if sliding[i] else 0.05) * drive
-        level[i] = 1.0 + (0.0 if sliding[i] else static) - running_in * (1.0 - np.exp(-slid[i] / 3.0))
+        stuck[i] = 0.0 if sliding[i] else static
+        level[i] = 1.0 - running_in * (1.0 - np.exp(-slid[i] / 3.0))
 
 
 def _drive_speed(train, torque):

@@ -12,7 +12,7 @@ import numpy as np
 
 from backdrive_bayes.bench.engine import rows
 
-INERTIA = 0.01
+INERTIA = 0.005
 """Inertia of a body in normalised units: small enough that a gap is crossed within a few steps."""
 FLANKS = 2
 """Pairs of flanks that share the load of a link with clearance."""

@@ -46,10 +46,10 @@ def draw_asymmetric_stiffness(rng, reducer):
 
 @dataclass(frozen=True)
 class StickSlip(EngineEffect):
-    """Static friction of all bearings above the kinetic one by the share ``strength``."""
+    """Static friction of all loaded bearings above the kinetic one by the share ``strength``."""
 
     guess = 0.2
-    most = 3.0
+    most = 2.5
 
     def train(self, run, train):
         """Bearings that break loose."""
