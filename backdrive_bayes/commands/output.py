@@ -17,6 +17,9 @@ import numpy as np
 
 from backdrive_bayes.errors import BadInput
 
+LONGEST_LINE = 2000
+"""Characters of a complaint; what a hostile file makes a parser say has no end."""
+
 
 def say(text: str = "") -> None:
     """Write one line of result to standard output; control characters in it are shown, not obeyed."""
@@ -30,7 +33,8 @@ def complain(error: Exception | str) -> None:
     """Write the one line on standard error that goes with exit code 2."""
     if isinstance(error, OSError) and error.strerror:
         error = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    _write(sys.stderr, "backdrive-bayes: " + " ".join(str(error).split()))
+    line = " ".join(str(error).split())
+    _write(sys.stderr, "backdrive-bayes: " + (line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…"))
 
 
 def probability_text(probability: float) -> str:

@@ -6,10 +6,11 @@ import math
 
 from backdrive_bayes.records.findings import Finding
 from backdrive_bayes.records.signs import inverted, not_answering
-from backdrive_bayes.records.wraps import LARGEST_STEP_RAD
+from backdrive_bayes.records.wraps import LARGEST_STEP_RAD, TURN_RAD
 
 _DEG = 180.0 / math.pi
-_ABSURD_TIMES = 20.0  # rated torque against the largest tested: beyond this a unit or a column is wrong
+_OVERLOADED_TIMES, _UNTESTED_SHARE = 20.0, 0.01  # tested against rated torque: beyond these a unit or a column is wrong
+_MOST_TURNS = 0.5
 FEWEST_SAMPLES = 60
 MOST_CYCLES = 2000
 
@@ -19,6 +20,7 @@ def judge_physics(found: dict, columns: dict[str, str]):
     yield from _samples(found)
     yield from _signs(found, columns)
     yield from _jumps(found["angle_jumps"])
+    yield from _range(found)
     loop = found["measured_loop"]
     if found["energy_given"]:
         yield Finding(
@@ -31,7 +33,7 @@ def judge_physics(found: dict, columns: dict[str, str]):
 
 def judge_rated_torque(rated_nm: float, tested_nm: float):
     """A finding where the rated torque and the largest torque tested cannot belong together."""
-    if not 1.0 / _ABSURD_TIMES <= tested_nm / rated_nm <= _ABSURD_TIMES:
+    if not _UNTESTED_SHARE <= tested_nm / rated_nm <= _OVERLOADED_TIMES:
         times = tested_nm / rated_nm
         much = f"{times:.3g} times" if times > 1.0 else f"1/{1.0 / times:.3g} of"
         yield Finding(
@@ -105,4 +107,14 @@ def _jumps(jumps):
             "angle_step",
             f"the angle moves {jumps['largest_step_rad'] * _DEG:.4g}° between two samples, more than a quarter of a turn: "
             "wrong unit, or a wrap that cannot be told",
+        )
+
+
+def _range(found):
+    turned = found["angle_signal_rad"] / TURN_RAD
+    if turned > _MOST_TURNS:
+        yield Finding(
+            "warning",
+            "angle_range",
+            f"the angle moves {turned:.3g} turns; with the input locked a reducer gives way by a small part of one: wrong unit?",
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -42,6 +43,13 @@ def check_file_size(path: Path) -> None:
         raise BadInput(path, "a file of at most 2 GB", f"{status.st_size / 1e9:.1f} GB")
     if status.st_size == 0:
         raise BadInput(path, "a table of samples", "an empty file")
+
+
+def silence(package: str) -> None:
+    """Keep a parser's loggers, of which some write to the terminal by themselves, from talking about damaged files."""
+    for name in [package, *logging.root.manager.loggerDict]:
+        if name == package or name.startswith(f"{package}."):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 def check_rows(path: Path, rows: int) -> None:

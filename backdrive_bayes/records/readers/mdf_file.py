@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.records.quantities import labelled
 from backdrive_bayes.records.readers.clocks import TIME_HEADER, Signal, on_one_clock
-from backdrive_bayes.records.readers.limits import MAX_ROWS, Choose, Columns
+from backdrive_bayes.records.readers.limits import MAX_ROWS, Choose, Columns, silence
 
 
 def read(path: Path, choose: Choose) -> Columns:
@@ -22,7 +21,7 @@ def read(path: Path, choose: Choose) -> Columns:
         import asammdf
     except ImportError as error:
         raise MissingExtra("reading MDF", "asammdf", "mdf") from error
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL)
+    silence("asammdf")
     with path.open("rb") as start:
         if start.read(3) != b"MDF":
             raise BadInput(path, "an MDF file", "another format")

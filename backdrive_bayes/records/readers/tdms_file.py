@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.records.header_names import is_named
 from backdrive_bayes.records.quantities import UNITS, labelled, split_unit
 from backdrive_bayes.records.readers.clocks import TIME_HEADER, Signal, on_one_clock
-from backdrive_bayes.records.readers.limits import Choose, Columns, check_rows, finite_columns
+from backdrive_bayes.records.readers.limits import Choose, Columns, check_rows, finite_columns, silence
 
 _UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
 
@@ -27,10 +27,12 @@ def read(path: Path, choose: Choose) -> Columns:
         import nptdms
     except ImportError as error:
         raise MissingExtra("reading TDMS", "nptdms", "readers") from error
-    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # its warnings of damaged files would fill the terminal
+    silence("nptdms")
     try:
         with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
-            return _read_channels(path, _named(file), file, choose)
+            columns = _read_channels(path, _named(file), file, choose)
+            cut = getattr(getattr(file, "file_status", None), "incomplete_final_segment", False)
+            return replace(columns, notes=(*columns.notes, "the file ends before its last segment does")) if cut else columns
     except BadInput:
         raise
     except (ValueError, KeyError, OSError, EOFError, struct.error) as error:
