@@ -41,7 +41,7 @@ def _damaged_archive(data: bytes, generator) -> bytes:
 
 def _damage(data: bytes, generator, text: bool) -> bytes:
     buffer = bytearray(data)
-    for _ in range(int(generator.choice([1, 1, 2, 4, 16]))):
+    for _ in range(int(generator.choice([1, 1, 1, 2, 4, 16]))):
         kind = generator.choice(["word", "flip", "cut", "double", "swap", "fill", "drop"] if text else _BINARY)
         # Heads of files hold what steers a reader: half of the damage is done there.
         reach = min(len(buffer), 600) if generator.random() < 0.5 else len(buffer)
@@ -50,7 +50,7 @@ def _damage(data: bytes, generator, text: bool) -> bytes:
         if kind == "word":
             buffer[at : at + length * int(generator.integers(2))] = WORDS[generator.integers(len(WORDS))]
         elif kind == "flip":
-            for k in generator.integers(len(buffer) or 1, size=int(generator.choice([1, 4, 30]))):
+            for k in generator.integers(len(buffer) or 1, size=int(generator.choice([1, 1, 2, 30]))):
                 if k < len(buffer):
                     buffer[min(int(k), max(reach - 1, 0))] ^= 1 << int(generator.integers(8))
         elif kind == "cut":

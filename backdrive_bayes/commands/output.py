@@ -33,7 +33,7 @@ def complain(error: Exception | str) -> None:
     """Write the one line on standard error that goes with exit code 2."""
     if isinstance(error, OSError) and error.strerror:
         error = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    line = " ".join(str(error).split())
+    line = in_encoding_of(sys.stderr, " ".join(str(error).split()))
     _write(sys.stderr, "backdrive-bayes: " + (line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…"))
 
 

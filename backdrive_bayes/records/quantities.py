@@ -124,7 +124,7 @@ def columns_to_paste(headers: tuple[str, ...]) -> str:
 def _without_unit(headers, kind) -> str:
     """A header that is called like the channel, or a place-holder, with a unit that its reader has to put right."""
     named = [h for h in headers if _bare(h) == kind or is_named(split_unit(h)[0], kind) or is_named(h, kind)]
-    return f"{named[0].strip() if named else 'NAME'} [{_EXAMPLES[kind]}]"
+    return f"{named[0].strip()[:200] if named else 'NAME'} [{_EXAMPLES[kind]}]"
 
 
 def _default_column(headers, kind, where) -> tuple[str, Quantity]:
@@ -208,5 +208,5 @@ def _suggestion(unit: str, kind: str) -> str:
 
 
 def _listed(names) -> str:
-    shown = ", ".join(f"'{name}'" for name in names[:8]) or "none"
+    shown = ", ".join(f"'{name if len(name) <= 60 else name[:59] + '…'}'" for name in names[:8]) or "none"
     return shown + (", …" if len(names) > 8 else "")

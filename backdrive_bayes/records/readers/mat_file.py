@@ -7,6 +7,7 @@ from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.readers.limits import Choose, Columns, check_rows, finite_columns
+from backdrive_bayes.records.readers.mat5 import is_level_5, leaves
 
 _HDF5_MARK_AT = 512  # version 7.3 is HDF5 behind a 512-byte MATLAB header
 _MOST_DEPTH = 4  # structures within structures
@@ -14,46 +15,45 @@ _MOST_ITEMS = 5000
 
 
 def read(path: Path, choose: Choose) -> Columns:
-    """Read the chosen variables, which must be vectors; their length is checked before any is read."""
+    """Read the chosen variables, which must be vectors; their length is checked before any is read.
+
+    Fields of structures go by their own name where it is the only one, else as 'structure.field'.
+    """
     with path.open("rb") as file:
         start = file.read(_HDF5_MARK_AT + 8)
-    hdf5 = any(start[at : at + 4] == b"\x89HDF" for at in (0, _HDF5_MARK_AT))
-    wanted, arrays = (_read_hdf5 if hdf5 else _read_classic)(path, choose)
+    if any(start[at : at + 4] == b"\x89HDF" for at in (0, _HDF5_MARK_AT)):
+        wanted, arrays = _read_hdf5(path, choose)
+    else:
+        wanted, arrays = (_read_level_5 if is_level_5(start) else _read_level_4)(path, choose)
     return finite_columns(path, wanted, arrays)
 
 
-def _read_classic(path: Path, choose: Choose):
+def _read_level_5(path: Path, choose: Choose):
+    try:
+        found = _shortest_names([(leaf.name, leaf) for leaf in leaves(path.read_bytes())])
+        wanted = _chosen(path, {name: leaf.shape for name, leaf in found.items()}, choose)
+        return wanted, [found[name].values for name in wanted]
+    except BadInput:
+        raise
+    except ValueError as error:
+        raise BadInput(path, "a MATLAB file", str(error)[:120]) from error
+
+
+def _read_level_4(path: Path, choose: Choose):
     from scipy.io import loadmat, whosmat
+    from scipy.io.matlab import matfile_version
 
     try:
-        listed = whosmat(path)
-        structs = [name for name, _, kind in listed if kind == "struct"]
-        found = {name: shape for name, shape, kind in listed if kind != "struct"}
-        fields = _fields(path, loadmat(path, variable_names=structs, squeeze_me=False)) if structs else {}
-        shapes = found | {name: value.shape for name, value in fields.items()}
-        wanted = _chosen(path, shapes, choose)
-        plain = [name for name in wanted if name in found]
-        content = loadmat(path, variable_names=plain, squeeze_me=False) if plain else {}
+        if matfile_version(path)[0] != 0:
+            raise ValueError("another format")
+        wanted = _chosen(path, {name: shape for name, shape, _ in whosmat(path)}, choose)
+        content = loadmat(path, variable_names=wanted, squeeze_me=False)
     except (BadInput, MemoryError):
         raise
-    # The parser raises nearly anything at damaged bytes, assertions and unbound names among it.
+    # The parser raises nearly anything at damaged bytes.
     except Exception as error:
         raise BadInput(path, "a MATLAB file", str(error)[:120] or type(error).__name__) from error
-    return wanted, [content[name] if name in found else fields[name] for name in wanted]
-
-
-def _fields(path: Path, content: dict) -> dict:
-    """Numeric fields of structures, by their own name where it is the only one, else with the structure's in front."""
-    found, waiting = [], [(name, value, 0) for name, value in content.items() if not name.startswith("__")]
-    while waiting:
-        name, value, depth = waiting.pop()
-        if getattr(value, "dtype", None) is None or depth > _MOST_DEPTH:
-            continue
-        if value.dtype.names and value.size == 1:
-            waiting += [(f"{name}.{field}", value[field].ravel()[0], depth + 1) for field in value.dtype.names]
-        elif value.dtype.kind in "fiu" and value.size == max(value.shape, default=0) > 1:
-            found.append((name, value))
-    return _shortest_names(found)
+    return wanted, [content[name] for name in wanted]
 
 
 def _shortest_names(found: list) -> dict:
