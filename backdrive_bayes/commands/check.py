@@ -38,6 +38,8 @@ def _summarise(result: dict) -> None:
     for record in result["records"]:
         say(f"  {record['record']}: {_extent(record)}")
         say(f"    {_levels(record['noise'])}{_closure(record)}")
+        if record["measured_loop"]:
+            say(f"    {_measured(record['measured_loop'])}")
     for finding in result["findings"]:
         where = f"{finding['record']}: " if finding["record"] else ""
         say(f"  {finding['level']}: {where}{finding['text']}")
@@ -59,6 +61,20 @@ def _levels(noise: dict) -> str:
         f"angle noise {noise['white_rad'] * _ARCMIN:.2g}′ white, {correlated}; "
         f"torque noise {noise['torque_Nm']:.2g} N·m"
     )
+
+
+def _measured(loop: dict) -> str:
+    width = loop["zero_torque_width_rad"]
+    parts = [
+        f"∮τ dθ = {loop['loop_area_J'] * 1e3:.4g} ± {loop['loop_area_J_sd'] * 1e3:.1g} mJ",
+        _angle("half peak to peak", loop, "half_peak_to_peak_rad"),
+        *([] if width is None else [_angle("w(0)", loop, "zero_torque_width_rad")]),
+    ]
+    return f"measured {loop['basis']} cycle: {', '.join(parts)}"
+
+
+def _angle(name: str, loop: dict, key: str) -> str:
+    return f"{name} = {loop[key] * _ARCMIN:.4g}′ ± {loop[f'{key}_sd'] * _ARCMIN:.1g}′"
 
 
 def _closure(record: dict) -> str:

@@ -59,7 +59,7 @@ def area_weights(torque_nm: np.ndarray) -> np.ndarray:
     return 0.5 * (np.roll(torque_nm, 1) - np.roll(torque_nm, -1))
 
 
-def settled_cycle(record: Record, segments, found: Cycles, k: int) -> dict:
+def settled_cycle(record: Record, segments, k: int) -> dict:
     """Weights (samples,) of area, height, widths (None where zero torque is not passed) and drift of ramps k and k + 1."""
     start, stop = segments[k].start, segments[k + 1].stop
     first, middle, last = (_tip_weights(record, segments, edge) for edge in (k, k + 1, k + 2))
@@ -75,7 +75,7 @@ def settled_cycle(record: Record, segments, found: Cycles, k: int) -> dict:
     return {"area": area - (area @ share) * drift, "height": height, "widths": widths, "drift": drift}
 
 
-def first_cycle(record: Record, segments, found: Cycles, k: int) -> dict:
+def first_cycle(record: Record, segments, k: int) -> dict:
     """As ``settled_cycle`` for ramps k to k + 2 from rest to rest, of which the middle one is full; no drift is taken out."""
     start, stop = segments[k].start, segments[k + 2].stop
     area = np.zeros(len(record.time_s))

@@ -52,13 +52,15 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
     found = cycles_of(record, segments)
     if found is None:
         return None
-    parts = [(settled_cycle if found.settled else first_cycle)(record, segments, found, k) for k in found.starts]
-    area, height, drift = (sum(part[name] for part in parts) / len(parts) for name in ("area", "height", "drift"))
-    width, width_sd = _width(record, found, [part["widths"] for part in parts if part["widths"] is not None], noise)
+    weights = settled_cycle if found.settled else first_cycle
+    # One cycle at a time: their weights are as long as the record.
+    mean = _mean(weights(record, segments, k) for k in found.starts)
+    area, height, drift = mean["area"], mean["height"], mean["drift"]
+    width, width_sd = _width(record, found, mean.get("widths"), noise)
     return MeasuredLoop(
         record=record.name,
         basis="settled" if found.settled else "first",
-        cycles=len(parts),
+        cycles=len(found.starts),
         amplitude_nm=found.amplitude_nm,
         drift_rad=float(drift @ record.angle_rad),
         loop_area_j=float(area @ record.angle_rad),
@@ -70,14 +72,24 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
     )
 
 
-def _width(record: Record, found, widths, noise) -> tuple[float | None, float | None]:
+def _mean(parts) -> dict[str, np.ndarray]:
+    """Mean of each named array over the parts that have it."""
+    total, count = {}, {}
+    for part in parts:
+        for name, values in part.items():
+            if values is not None:
+                total[name] = total.get(name, 0.0) + values
+                count[name] = count.get(name, 0) + 1
+    return {name: values / count[name] for name, values in total.items()}
+
+
+def _width(record: Record, found, weights, noise) -> tuple[float | None, float | None]:
     """Mean width at zero torque and its standard error; what a window twice as long changes is an error of its own."""
-    if not widths:
+    if weights is None:
         return None, None
-    weights = sum(widths) / len(widths)
     short, long = weights @ record.angle_rad
     ramp = 2.0 * RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0]) / 2.0
-    torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(widths)))
+    torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(found.starts)))
     return float(short), float(np.sqrt(_angle_error(record, weights[0], noise) ** 2 + torque**2 + (long - short) ** 2))
 
 
