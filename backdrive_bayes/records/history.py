@@ -10,8 +10,8 @@ from scipy.optimize import isotonic_regression
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.clock import strictly_rising
+from backdrive_bayes.records.columns import find_column
 from backdrive_bayes.records.plausible import in_si
-from backdrive_bayes.records.quantities import find_column
 from backdrive_bayes.records.readers import read_columns
 
 NOISY_SHARE = 0.02

@@ -9,9 +9,9 @@ import numpy as np
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.clock import strictly_rising
+from backdrive_bayes.records.columns import find_column, spelling
 from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild
 from backdrive_bayes.records.plausible import check_plausible, in_si
-from backdrive_bayes.records.quantities import find_column, spelling
 from backdrive_bayes.records.readers import READERS, read_columns, record_suffix
 from backdrive_bayes.records.readers.limits import Columns
 from backdrive_bayes.records.record import Record, Unit

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.records.quantities import DEFAULT_COLUMNS, UNITS, find_column, parse_quantity
+from backdrive_bayes.records.columns import DEFAULT_COLUMNS, find_column
+from backdrive_bayes.records.quantities import UNITS, parse_quantity
 
 
 @pytest.mark.parametrize(
