@@ -1,0 +1,1 @@
+"""The one inference engine: reduced data, marginal likelihood, posterior."""

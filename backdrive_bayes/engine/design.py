@@ -1,0 +1,126 @@
+"""Columns of a unit: the class and the effects, at a distortion and a set of knots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backdrive_bayes.engine.marginal import Scales
+from backdrive_bayes.engine.reduced import Reduced
+from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.history import History, of_blocks
+from backdrive_bayes.mechanics.reducer import ReducerClass
+
+INITIAL_LOG_SCALE = (float(np.log(0.02)), 1.5)
+FLOATING_LOG_SCALE = (float(np.log(0.8)), 0.0)
+"""A floating clearance lies anywhere between its flanks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Columns that share a scale: one array (blocks, weights) a record; ``own`` where each record has weights of its own."""
+
+    name: str
+    columns: tuple[np.ndarray, ...]
+    own: bool = False
+
+    @property
+    def width(self) -> int:
+        """Number of weights."""
+        return sum(c.shape[1] for c in self.columns) if self.own else self.columns[0].shape[1]
+
+    def of_record(self, record: int) -> np.ndarray:
+        """Columns of all weights at one record's blocks, zero for other records' own weights."""
+        if not self.own:
+            return self.columns[record]
+        rows = self.columns[record].shape[0]
+        return np.hstack([c if r == record else np.zeros((rows, c.shape[1])) for r, c in enumerate(self.columns)])
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Groups of columns side by side."""
+
+    groups: tuple[Group, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the groups in order."""
+        return tuple(g.name for g in self.groups)
+
+    @property
+    def index(self) -> np.ndarray:
+        """Number of the group of every weight."""
+        return np.repeat(np.arange(len(self.groups)), [g.width for g in self.groups])
+
+    def records(self) -> list[np.ndarray]:
+        """All columns of each record."""
+        return [np.hstack([g.of_record(r) for g in self.groups]) for r in range(len(self.groups[0].columns))]
+
+    def split(self, weights) -> dict[str, np.ndarray]:
+        """Weights (weights, …) by group."""
+        ends = np.cumsum([g.width for g in self.groups])
+        return dict(zip(self.names, np.split(weights, ends[:-1]), strict=True))
+
+    def predict(self, weights: Mapping[str, np.ndarray], names=None) -> list[np.ndarray]:
+        """Sum of the named groups' columns times their weights at each record's blocks."""
+        used = [g for g in self.groups if g.name in (names or weights)]
+        return [sum(g.of_record(r) @ weights[g.name] for g in used) for r in range(len(self.groups[0].columns))]
+
+    def scales(self, priors: Mapping[str, tuple[float, float]]) -> Scales:
+        """Scales of the weights with (mean, sd) of each group's log scale."""
+        table = np.array([priors[n] for n in self.names], float).reshape(-1, 2)
+        return Scales(self.index, table[:, 0], table[:, 1])
+
+    def joined(self, *groups: Group) -> Design:
+        """This design with more groups."""
+        return Design(self.groups + groups)
+
+
+def histories(reduced: Reduced, distortion: Distortion) -> list[History]:
+    """Torque histories of all records as the reducer felt them."""
+    return [of_blocks(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
+
+
+def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, clearance_weights=None) -> Design:
+    """Columns of the class at a distortion."""
+    found: dict[str, list] = {}
+    for r, history in enumerate(histories(reduced, distortion)):
+        log_rate = reduced.context.log_rate[r]
+        columns = reducer.columns(history, distortion.exponents, log_rate)
+        columns |= reducer.initial_columns(history, clearance_weights, distortion.exponents, log_rate)
+        for name, column in columns.items():
+            found.setdefault(name, []).append(column)
+    return Design(tuple(Group(n, tuple(c), n in ("initial", "floating")) for n, c in found.items()))
+
+
+def class_priors(reducer: ReducerClass) -> dict[str, tuple[float, float]]:
+    """Normal priors of the class's log scales by group."""
+    return {p.name: p.log_scale for p in reducer.parts} | {"initial": INITIAL_LOG_SCALE, "floating": FLOATING_LOG_SCALE}
+
+
+def path_group(reduced: Reduced, effect: PathEffect) -> Group:
+    """Columns of an effect that follows from the torque history; its prior scale is its own."""
+    columns = []
+    for r, history in enumerate(histories(reduced, Distortion())):
+        columns.append(history.mean(*effect.responses(history, r, reduced.context)))
+    return Group(effect.name, tuple(columns), effect.per_record)
+
+
+def tangent_groups(reduced, reducer, design: Design, distortion, weights, effects: tuple[Effect, ...]) -> tuple[Group, ...]:
+    """Derivatives of the class's prediction with ``weights`` by the parameter of every tangent effect that can be told."""
+    base, groups = design.predict(weights), []
+    for effect in effects:
+        if not isinstance(effect, TangentEffect) or not told(reduced, effect):
+            continue
+        moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + effect.step})
+        there = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
+        groups.append(Group(effect.name, tuple(((a - b) / effect.step)[:, None] for a, b in zip(there, base, strict=True))))
+    return tuple(groups)
+
+
+def told(reduced: Reduced, effect: TangentEffect) -> bool:
+    """Whether the records differ enough in rate for an exponent of the rate."""
+    return not effect.parameter.endswith("exponent") or np.ptp(reduced.context.log_rate) > 0.05

@@ -1,0 +1,92 @@
+"""The one way from a unit to a posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from backdrive_bayes.engine.design import class_priors
+from backdrive_bayes.engine.linearise import WIDE, Linear, linearise
+from backdrive_bayes.engine.marginal import find_scales
+from backdrive_bayes.engine.posterior import Posterior, RecordFacts
+from backdrive_bayes.engine.reduced import Reduced, reduce_unit
+from backdrive_bayes.engine.sample import sample
+from backdrive_bayes.mechanics.registry import all_effects
+from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.records.faults import without_wild
+from backdrive_bayes.records.record import Unit
+
+PRESENT_SD = 1.0
+"""Standard deviation of the log scale of an effect that a hypothesis holds."""
+
+
+def library_terms():
+    """Every term of every listed effect."""
+    return tuple(term for terms in all_effects().values() for term in terms)
+
+
+def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda text: None) -> Linear:
+    """The linear model of a unit about its mode."""
+    with threadpool_limits(1, user_api="blas"):
+        note("reducing the records")
+        reduced = reduce_unit(without_wild(unit))
+        note("finding the mode")
+        return linearise(reduced, library_terms(), modules)
+
+
+def infer(linear: Linear, hypothesis: tuple[str, ...] | None = None, seed: int = 0, note=lambda text: None) -> Posterior:
+    """Posterior of a unit.
+
+    ``hypothesis`` names effects that are present while all others stay at trace level; with None every effect has a wide scale of
+    its own, which averages over what may be there.
+    """
+    with threadpool_limits(1, user_api="blas"):
+        scales = linear.design.scales(_priors(linear, hypothesis))
+        start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
+        mode, solution = find_scales(linear.data, scales, start)
+        drawn = sample(linear.data, scales, mode, linear.design.names, seed, note)
+    reduced, names = linear.reduced, linear.design.names
+    return Posterior(
+        unit_name=reduced.unit.name,
+        data_hashes=tuple(filter(None, [reduced.unit.data_hash])),
+        rated_torque_nm=reduced.unit.rated_torque_nm,
+        reducer=linear.reducer,
+        distortion=linear.distortion,
+        effects=linear.effects,
+        context=reduced.context,
+        records=_facts(reduced),
+        weights=dict(zip(names, np.split(drawn.weights, np.cumsum([g.width for g in linear.design.groups])[:-1], axis=-1), strict=True)),
+        log_scale={n: drawn.log_scale[..., i] for i, n in enumerate(names)},
+        log_density=drawn.log_density,
+        predicted_rad=tuple(p * reduced.angle_scale_rad for p in linear.predicted),
+        residual=tuple(np.split(linear.data.y - linear.data.x @ solution.mean, np.cumsum([a.size for a in linear.angles])[:-1])),
+        noise_sd_rad=tuple(np.sqrt(np.diag(c)) * reduced.angle_scale_rad for c in linear.covariances),
+        convergence=drawn.convergence,
+        acceptance=drawn.acceptance,
+        seed=seed,
+        hypothesis=hypothesis,
+        jitter=(linear.jitter.torque * reduced.torque_scale_nm, linear.jitter.length * reduced.torque_scale_nm),
+    )
+
+
+def _priors(linear, hypothesis):
+    context, priors = linear.reduced.context, class_priors(linear.reducer)
+    present = {t.name for n in hypothesis or () for t in all_effects().get(n, ())}
+    for effect in linear.effects:
+        if hypothesis is None:
+            priors[effect.name] = (float(np.log(effect.present(context))), WIDE)
+        elif effect.name in present:
+            priors[effect.name] = (float(np.log(effect.present(context))), PRESENT_SD)
+        else:
+            priors[effect.name] = (float(np.log(effect.trace(context))), 0.0)
+    for name in linear.design.names:
+        priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))
+    return priors
+
+
+def _facts(reduced: Reduced) -> RecordFacts:
+    rate = reduced.context.rate * reduced.torque_scale_nm
+    amplitude = np.array([np.abs(b.turning_nm).max() for b in reduced.blocks])
+    return RecordFacts(tuple(b.name for b in reduced.blocks), rate, amplitude, reduced.blocks)

@@ -1,0 +1,196 @@
+"""The mode of the few nonlinear parameters, with every listed effect present under a wide scale, and the linear model about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backdrive_bayes.engine.design import (
+    Design,
+    Group,
+    class_groups,
+    class_priors,
+    histories,
+    path_group,
+    tangent_groups,
+)
+from backdrive_bayes.engine.marginal import Solution, Whitened, find_scales, whiten
+from backdrive_bayes.engine.reduced import Jitter, Reduced
+from backdrive_bayes.engine.start import possible_starts
+from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.reducer import BASELINE, TOP, ReducerClass, place_knots, spaced
+
+KNOTS = 60
+MOST_KNOTS = 140
+LEAST_APART = 0.3
+"""Least distance of knots in the torque noise of a sample."""
+CONSPICUOUS = 3.5
+"""Whitened residual beyond which the knots near a block are refined."""
+REFINEMENTS = 3
+STEPS = 14
+TRIAL_STEPS = 2
+LONGEST_STEP = 2e-3
+"""Longest step of a distortion, in shares of the torque; exponents fifty times as much."""
+WIDE = 2.0
+"""Standard deviation of an effect's log scale while the mode is sought."""
+USUAL_JITTER = Jitter(0.15, 0.002)
+"""Of the bench's torque noise, and of the torque scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The linear model of a unit about its mode.
+
+    ``design`` holds the class and every effect, ``angles`` what its weights explain (tangent effects counted from an undistorted
+    bench), ``covariances`` the noise; ``log_scale`` and ``solution`` are those of the joint model, ``predicted`` its block means of the angle.
+    """
+
+    reduced: Reduced
+    reducer: ReducerClass
+    distortion: Distortion
+    design: Design
+    effects: tuple[Effect, ...]
+    angles: tuple[np.ndarray, ...]
+    covariances: tuple[np.ndarray, ...]
+    data: Whitened
+    log_scale: dict[str, float]
+    solution: Solution
+    jitter: Jitter
+    predicted: tuple[np.ndarray, ...]
+
+    @property
+    def weights(self) -> dict[str, np.ndarray]:
+        """Mean weights by group."""
+        return self.design.split(self.solution.mean)
+
+    def residuals(self) -> list[np.ndarray]:
+        """Whitened residual of each record's blocks."""
+        white = self.data.y - self.data.x @ self.solution.mean
+        return np.split(white, np.cumsum([a.size for a in self.angles])[:-1])
+
+
+def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE, extra: tuple[Group, ...] = ()) -> Linear:
+    """The joint model's mode: damped Gauss-Newton steps for the distortion, knots refined where the residual asks for it."""
+    fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)) + extra
+    search = _Search(reduced, effects, modules, fixed)
+    trials = [search.run(start, TRIAL_STEPS) for start in possible_starts(reduced)]
+    best = max(trials, key=lambda found: found.solution.log_marginal)
+    return search.run(best.distortion, STEPS, refine=True)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    reduced: Reduced
+    effects: tuple[Effect, ...]
+    modules: tuple[str, ...]
+    fixed: tuple[Group, ...]
+
+    def run(self, distortion: Distortion, steps: int, refine: bool = False) -> Linear:
+        reduced, context = self.reduced, self.reduced.context
+        jitter = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
+        covariances = reduced.covariances(reduced.slopes(reduced.angles, 2.0), jitter)
+        laid, weights, start, refined = None, None, None, 0
+        for step in range(steps):
+            if laid is None or (not refined and _far(laid, distortion, context)):
+                laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules), None
+            if weights is None:
+                design = class_groups(reduced, reducer, distortion).joined(*self.fixed)
+                weights = design.split(self._solve(reducer, design, reduced.angles, covariances, None)[2].mean)
+                start = None
+            linear, start = self._linear(reducer, distortion, weights, covariances, start, jitter)
+            weights = linear.weights
+            moved = self._moved(linear)
+            covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
+            still = _length(moved, distortion, context) < 0.025 * LONGEST_STEP
+            if refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
+                knots = _refined(linear)
+                if knots is not None:
+                    reducer, weights, refined = ReducerClass(knots, self.modules), None, refined + 1
+                    distortion = _towards(distortion, moved, context)
+                    continue
+            if still and step >= 2:
+                break
+            distortion = _towards(distortion, moved, context)
+        return linear
+
+    def _knots(self, distortion):
+        torques = []
+        for r, (history, blocks) in enumerate(zip(histories(self.reduced, distortion), self.reduced.blocks, strict=True)):
+            middle = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
+            settled = blocks.leg > 0 if blocks.direction.size > 1 else blocks.leg >= 0
+            torques.append(middle[settled] * np.exp(-distortion.drag_exponent * self.reduced.context.log_rate[r]))
+        return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
+
+    def _linear(self, reducer, distortion, weights, covariances, start, jitter):
+        core = class_groups(self.reduced, reducer, distortion, weights.get("clearance"))
+        tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
+        design = core.joined(*self.fixed, *tangents)
+        shift = _shift(design, distortion, self.effects)
+        angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
+        if start is not None and start.size != len(design.groups):
+            start = None
+        data, log_scale, solution = self._solve(reducer, design, angles, covariances, start)
+        named = dict(zip(design.names, log_scale, strict=True))
+        explained = design.predict(design.split(solution.mean))
+        predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
+        shared = (self.reduced, reducer, distortion, design, self.effects, angles, tuple(covariances), data)
+        return Linear(*shared, named, solution, jitter, predicted), log_scale
+
+    def _solve(self, reducer, design, angles, covariances, start):
+        priors = class_priors(reducer)
+        priors |= {e.name: (float(np.log(e.present(self.reduced.context))), WIDE) for e in self.effects}
+        priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
+        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof)
+        log_scale, solution = find_scales(data, design.scales(priors), start, 12 if start is None else 4)
+        return data, log_scale, solution
+
+    def _moved(self, linear):
+        weights = linear.weights
+        tangent = {e.parameter: float(weights[e.name][0]) for e in self.effects if isinstance(e, TangentEffect) and e.name in weights}
+        return replace(linear.distortion, **tangent)
+
+
+def _shift(design, distortion, effects):
+    """What the tangent effects' columns make of the distortion itself."""
+    found = [0.0] * len(design.groups[0].columns)
+    for effect in effects:
+        if isinstance(effect, TangentEffect) and effect.name in design.names:
+            group = design.groups[design.names.index(effect.name)]
+            found = [f + c[:, 0] * getattr(distortion, effect.parameter) for f, c in zip(found, group.columns, strict=True)]
+    return found
+
+
+def _step(moved, distortion, context):
+    """Step in shares of the torque scale; exponents weigh a fiftieth."""
+    step = np.array([getattr(moved, n) - getattr(distortion, n) for n in vars(distortion)])
+    return step * [1.0, context.rate.max(), 0.02, 0.02]
+
+
+def _length(moved, distortion, context) -> float:
+    return float(np.abs(_step(moved, distortion, context)).max())
+
+
+def _towards(distortion, moved, context):
+    share = min(1.0, LONGEST_STEP / max(_length(moved, distortion, context), 1e-300))
+    values = {n: getattr(distortion, n) + share * (getattr(moved, n) - getattr(distortion, n)) for n in vars(distortion)}
+    return Distortion(**values)
+
+
+def _far(laid, distortion, context) -> bool:
+    return _length(laid, distortion, context) > LEAST_APART * context.torque_noise
+
+
+def _refined(linear) -> np.ndarray | None:
+    """Knots with those intervals split in four in which settled blocks leave a conspicuous residual; None if nothing is gained."""
+    reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
+    for blocks, white in zip(reduced.blocks, linear.residuals(), strict=True):
+        low, high = np.abs(blocks.edges_nm()) / reduced.torque_scale_nm
+        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & (blocks.leg > 0)):
+            for j in range(max(i - 1, 0), min(i + 2, white.size)):
+                wanted.append(np.linspace(low[j], high[j], 5))
+    if not wanted:
+        return None
+    inner = np.unique(np.concatenate([knots[:-1], *wanted]))
+    found = spaced(np.r_[inner[inner < TOP], TOP], 0.8 * LEAST_APART * reduced.context.torque_noise)
+    return found if knots.size < found.size <= MOST_KNOTS else None

@@ -1,0 +1,128 @@
+"""The posterior of one unit: draws of weights and scales, and what evaluates them on any torque history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from backdrive_bayes.engine.diagnostics import Convergence
+from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.history import History, through
+from backdrive_bayes.mechanics.reducer import ReducerClass
+
+
+@dataclass(frozen=True, eq=False)
+class RecordFacts:
+    """What a posterior keeps of each record: names, rates [N·m/s], amplitudes [N·m], and the blocks (tuples over records)."""
+
+    names: tuple[str, ...]
+    rate_nm_per_s: np.ndarray
+    amplitude_nm: np.ndarray
+    blocks: tuple
+
+    @property
+    def count(self) -> int:
+        """Number of records."""
+        return len(self.names)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Draws of one unit.
+
+    ``weights`` maps groups to arrays (chains, draws, weights) in shares of the angle scale, ``log_scale`` to arrays (chains, draws);
+    tangent effects' weights are values of their parameter. ``predicted_rad`` and ``residual`` hold the mode's block means and whitened
+    residuals by record. ``hypothesis`` names the effects that are present (None: every effect at a scale of its own).
+    """
+
+    unit_name: str
+    data_hashes: tuple[str, ...]
+    rated_torque_nm: float
+    reducer: ReducerClass
+    distortion: Distortion
+    effects: tuple[Effect, ...]
+    context: Context
+    records: RecordFacts
+    weights: dict[str, np.ndarray]
+    log_scale: dict[str, np.ndarray]
+    log_density: np.ndarray
+    predicted_rad: tuple[np.ndarray, ...]
+    residual: tuple[np.ndarray, ...]
+    noise_sd_rad: tuple[np.ndarray, ...]
+    convergence: Convergence
+    acceptance: float
+    seed: int
+    hypothesis: tuple[str, ...] | None = None
+    jitter: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every log scale and indicator passed the diagnostics."""
+        return self.convergence.converged
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Chains and draws."""
+        return self.log_density.shape
+
+    @cached_property
+    def flat(self) -> dict[str, np.ndarray]:
+        """Weights (draws, weights) by group, chains one after the other."""
+        return {n: w.reshape(-1, w.shape[-1]) for n, w in self.weights.items()}
+
+    def thinned(self, most: int) -> Posterior:
+        """At most ``most`` draws of each chain, evenly taken."""
+        keep = np.linspace(0, self.shape[1] - 1, min(most, self.shape[1])).astype(int)
+        return replace(
+            self,
+            weights={n: w[:, keep] for n, w in self.weights.items()},
+            log_scale={n: s[:, keep] for n, s in self.log_scale.items()},
+            log_density=self.log_density[:, keep],
+        )
+
+    def angles(self, history: History, rate_nm_per_s: float, modules=None) -> np.ndarray:
+        """Angles [rad] of the reducer at the ends of a history's segments, (draws, segments), without faults of the channel.
+
+        ``modules`` restricts the class to some of its modules and leaves out effects.
+        """
+        log_rate = self._log_rate(rate_nm_per_s)
+        found = 0.0
+        base = self.reducer.ends(history, self.distortion.exponents, log_rate)
+        for name, columns in base.items():
+            if modules is None or self.reducer.part(name).module in modules:
+                found = found + self.flat[name] @ columns.T
+        if modules is None:
+            found = found + self._effects(history, log_rate, base)
+        return found * self.context.angle_scale_rad
+
+    def _effects(self, history, log_rate, base):
+        """What effects of the reducer itself add, (draws, segments) in shares of the angle scale."""
+        found = 0.0
+        for effect in self.effects:
+            if effect.name not in self.flat or not effect.of_reducer:
+                continue
+            if isinstance(effect, PathEffect):
+                found = found + self.flat[effect.name] @ effect.responses(history, 0, self.context)[1].T
+            elif isinstance(effect, TangentEffect):
+                moved = replace(self.distortion, **{effect.parameter: getattr(self.distortion, effect.parameter) + effect.step})
+                there = self.reducer.ends(history, moved.exponents, log_rate)
+                mean = {n: self.flat[n].mean(axis=0) for n in base}
+                slope = sum((there[n] - base[n]) @ mean[n] for n in base) / effect.step
+                away = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter)
+                found = found + away[:, None] * slope
+        return found
+
+    def along(self, time_s, torque_nm) -> np.ndarray:
+        """Angles [rad] for a torque history, (draws, samples), zero at the first sample's neutral state."""
+        torque = np.asarray(torque_nm, float)
+        span = float(time_s[-1] - time_s[0])
+        rate = float(np.abs(np.diff(torque)).sum() / span) if span > 0 else float(self.records.rate_nm_per_s[0])
+        start = np.r_[torque[:1], torque]
+        history = through(np.r_[time_s[:1], time_s], start, self.context.torque_scale_nm)
+        return self.angles(history, max(rate, 1e-12))
+
+    def _log_rate(self, rate_nm_per_s) -> float:
+        measured = self.records.rate_nm_per_s
+        return float(np.log(rate_nm_per_s) - np.log(measured).mean())

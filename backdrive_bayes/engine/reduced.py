@@ -1,0 +1,108 @@
+"""What inference sees of a unit: block means in shares of two scales, their noise, and where the torque has been."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from backdrive_bayes.engine.covariance import block_covariance, local_slope
+from backdrive_bayes.mechanics.effect import Context
+from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
+from backdrive_bayes.records.record import Unit
+from backdrive_bayes.records.reduction import Blocks, reduce_record
+
+MOST_BLOCKS = 1200
+"""Blocks of all records together beyond which each record gets fewer."""
+WHITE_SHARE = 0.2
+"""Share of the white noise's standard deviation that is left in a block mean, for the scale of traces."""
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """Jitter of the crossing torques: clearances do not cross at the same torque twice.
+
+    ``torque`` is its standard deviation and ``length`` the torque over which it is correlated within a leg, in shares of the scale.
+    """
+
+    torque: float
+    length: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A unit reduced to block means; angles in shares of ``angle_scale_rad``, torques of ``torque_scale_nm`` (the largest)."""
+
+    unit: Unit
+    blocks: tuple[Blocks, ...]
+    noise: tuple[NoiseEstimate, ...]
+
+    @cached_property
+    def torque_scale_nm(self) -> float:
+        """Largest torque of the unit's records [N·m]."""
+        return float(max(np.abs(b.turning_nm).max() for b in self.blocks))
+
+    @cached_property
+    def angle_scale_rad(self) -> float:
+        """Half the widest angle range of any record [rad]."""
+        return float(0.5 * max(np.ptp(b.angle_rad) for b in self.blocks))
+
+    @cached_property
+    def angles(self) -> tuple[np.ndarray, ...]:
+        """Block means of the angle, (blocks,) for each record."""
+        return tuple(b.angle_rad / self.angle_scale_rad for b in self.blocks)
+
+    @cached_property
+    def context(self) -> Context:
+        """Rates, durations and noise levels."""
+        duration = np.array([b.end_s[-1] - b.begin_s[0] for b in self.blocks])
+        travel = np.array([np.abs(np.diff(b.turning_nm)).sum() for b in self.blocks])
+        angle = [np.hypot(n.correlated_rad, WHITE_SHARE * n.white_rad) for n in self.noise]
+        torque = [n.torque_nm for n in self.noise]
+        return Context(
+            self.torque_scale_nm,
+            self.angle_scale_rad,
+            travel / duration / self.torque_scale_nm,
+            duration,
+            float(np.median(angle)) / self.angle_scale_rad,
+            max(float(np.median(torque)) / self.torque_scale_nm, 1e-5),
+        )
+
+    @property
+    def scale_dof(self) -> float:
+        """Weight of the noise estimate in chi-square degrees of freedom."""
+        return float(min(n.scale_dof for n in self.noise))
+
+    def slopes(self, angles, least: float = 1.0) -> list[np.ndarray]:
+        """|dθ/dτ| of angles (blocks,) at the blocks [rad/(N·m)], over no less than ``least`` times the torque noise."""
+        scaled = (np.asarray(a) * self.angle_scale_rad for a in angles)
+        return [local_slope(b, a, least * n.torque_nm) for b, a, n in zip(self.blocks, scaled, self.noise, strict=True)]
+
+    def covariances(self, slopes, jitter: Jitter) -> list[np.ndarray]:
+        """Covariance of each record's block means in squared shares of the angle scale."""
+        found = []
+        for blocks, noise, slope in zip(self.blocks, self.noise, slopes, strict=True):
+            matrix = block_covariance(blocks, noise, slope)
+            size = slope * jitter.torque * self.torque_scale_nm
+            apart = np.abs(blocks.torque_nm[:, None] - blocks.torque_nm) / (jitter.length * self.torque_scale_nm)
+            matrix += (blocks.leg[:, None] == blocks.leg) * np.outer(size, size) * np.exp(-apart)
+            found.append(matrix / self.angle_scale_rad**2)
+        return found
+
+    def without(self, record: int) -> Reduced:
+        """The unit less one record."""
+        return replace(self, blocks=self.blocks[:record] + self.blocks[record + 1 :], noise=self.noise[:record] + self.noise[record + 1 :])
+
+
+def reduce_unit(unit: Unit, blocks_per_leg: int | None = None) -> Reduced:
+    """Block means of every record with the noise that all share."""
+    segments = [find_segments(r.time_s, r.torque_nm) for r in unit.records]
+    noise = estimate_common_noise(
+        [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, s) for r, s in zip(unit.records, segments, strict=True)]
+    )
+    # A loop from rest has two and a half legs.
+    count = blocks_per_leg or int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 60, 120))
+    blocks = tuple(reduce_record(r, s, n, count) for r, s, n in zip(unit.records, segments, noise, strict=True))
+    return Reduced(unit, blocks, noise)

@@ -1,0 +1,222 @@
+"""Sampling with emcee, the only module that knows it: log scales of the linear model, weights drawn exactly for each draw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import emcee
+import numpy as np
+from emcee.moves import DEMove, Move
+from scipy.linalg import cholesky, solve_triangular
+
+from backdrive_bayes.engine.diagnostics import MIN_ESS, Convergence, diagnose_draws
+from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, Whitened
+
+ENSEMBLES = 4
+WALKERS = 32
+DOF = 6.0
+"""Degrees of freedom of the Student-t that proposes: heavier tails than the posterior's."""
+INFLATED = 1.1
+"""Standard deviations of the proposal over those of the Laplace approximation."""
+FIRST_STEPS = 12
+MOST_STEPS = 384
+KEPT = 250
+"""Draws kept of every ensemble."""
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """``log_scale`` (chains, draws, scales), ``weights`` (chains, draws, weights), ``log_density`` (chains, draws)."""
+
+    log_scale: np.ndarray
+    weights: np.ndarray
+    log_density: np.ndarray
+    acceptance: float
+    convergence: Convergence
+
+
+class _Independence(Move):
+    """Proposes every walker anew from a Student-t about the mode (Metropolised independence)."""
+
+    def __init__(self, mean, root):
+        self.mean, self.root = mean, root
+
+    def log_density(self, x):
+        """Log density up to a constant, (walkers,)."""
+        z = solve_triangular(self.root, (x - self.mean).T, lower=True, check_finite=False)
+        return -0.5 * (DOF + self.mean.size) * np.log1p(np.sum(z**2, axis=0) / DOF)
+
+    def draw(self, random, count):
+        """Points (count, dimension)."""
+        scale = np.sqrt(DOF / random.chisquare(DOF, count))
+        return self.mean + (random.standard_normal((count, self.mean.size)) @ self.root.T) * scale[:, None]
+
+    def propose(self, model, state):
+        """One step for all walkers; emcee's interface."""
+        new = self.draw(model.random, state.coords.shape[0])
+        log_prob, blobs = model.compute_log_prob_fn(new)
+        ratio = log_prob - state.log_prob + self.log_density(state.coords) - self.log_density(new)
+        accepted = np.log(model.random.random_sample(new.shape[0])) < ratio
+        return self.update(state, emcee.State(new, log_prob=log_prob, blobs=blobs), accepted), accepted
+
+
+def sample(data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, note=lambda text: None) -> Draws:
+    """Draws of the log scales from their marginal posterior, and of the weights given each.
+
+    ``mode`` (scales,) holds the log scales at the mode, fixed ones included; ``names`` are those of the scales.
+    """
+    compressed, basis = compress(data, scales, mode)
+    free = np.flatnonzero(scales.free)
+    target = _Target(compressed, basis.group, scales, mode, free)
+    move = _adapted(target, _Independence(mode[free], _laplace_root(target, mode[free])), seed)
+    samplers = []
+    for chain in range(ENSEMBLES):
+        sampler = emcee.EnsembleSampler(
+            WALKERS, free.size, target, moves=[(move, 0.9), (DEMove(), 0.1)], vectorize=True
+        )
+        random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
+        sampler.random_state = random.get_state()
+        sampler.run_mcmc(move.draw(random, WALKERS), 4, skip_initial_state_check=True)
+        sampler.reset()
+        samplers.append(sampler)
+    convergence = _run(samplers, [names[i] for i in free], target, note)
+    drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
+    density = np.stack([s.get_log_prob().ravel() for s in samplers])
+    drawn, density = drawn[:, _thin(drawn)], density[:, _thin(drawn)]
+    log_scale = np.broadcast_to(mode, (*drawn.shape[:2], mode.size)).copy()
+    log_scale[..., free] = drawn
+    rng = np.random.default_rng([seed, ENSEMBLES])
+    flat = log_scale.reshape(-1, mode.size)
+    # Walkers that stay where they are share their log scales: one factorisation serves all their draws.
+    at, which = np.unique(flat, axis=0, return_inverse=True)
+    weights = np.empty((flat.shape[0], data.x.shape[1]))
+    for k in range(at.shape[0]):
+        own = np.flatnonzero(which == k)
+        weights[own] = draw_weights(compressed, basis, at[k], own.size, rng)
+    weights = weights.reshape(*drawn.shape[:2], -1)
+    acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
+    return Draws(log_scale, weights, density, acceptance, convergence)
+
+
+def _run(samplers, names, target, note) -> Convergence:
+    steps = FIRST_STEPS
+    while True:
+        for sampler in samplers:
+            sampler.run_mcmc(None, steps, skip_initial_state_check=True)
+        chains = [s.get_chain() for s in samplers]
+        values = np.stack([c.transpose(1, 0, 2).reshape(-1, len(names)) for c in chains])
+        when = np.tile(np.arange(chains[0].shape[0]), WALKERS)
+        convergence = diagnose_draws(names, values, np.stack([when] * len(samplers)), target.evaluations)
+        note(f"{target.evaluations} evaluations: {convergence.line()}")
+        if convergence.converged or chains[0].shape[0] >= MOST_STEPS:
+            return convergence
+        steps = chains[0].shape[0]
+
+
+def _thin(drawn):
+    return np.linspace(0, drawn.shape[1] - 1, min(KEPT, drawn.shape[1])).astype(int)
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """How compressed weights make the columns' own: ``turn`` (weights, compressed); ``rest`` (weights, left) are directions that the
+    data do not see; ``group`` and ``rest_group`` number their scales."""
+
+    turn: np.ndarray
+    rest: np.ndarray
+    group: np.ndarray
+    rest_group: np.ndarray
+
+
+SEEN = 0.05
+"""Share of the noise below which a direction of the weights is not seen by the data: it moves log marginal likelihoods by 1e-3."""
+ABOVE = 1.5
+"""How far above its mode a log scale may lie for that."""
+
+
+def compress(data: Whitened, scales: Scales, mode: np.ndarray) -> tuple[Whitened, Basis]:
+    """The same data with each group's weights turned to principal directions; what the data cannot see is set apart."""
+    turn, rest, group, rest_group = [], [], [], []
+    for k in range(scales.mean.size):
+        own = np.flatnonzero(scales.group == k)
+        if not own.size:
+            continue
+        value, vector = np.linalg.eigh(data.gram[np.ix_(own, own)])
+        widest = np.exp(min(mode[k] + ABOVE * (scales.sd[k] > 0), LOG_SCALES[1]))
+        seen = widest**2 * value > SEEN**2
+        for chosen, to, number in ((seen, turn, group), (~seen, rest, rest_group)):
+            wide = np.zeros((data.x.shape[1], int(chosen.sum())))
+            wide[own] = vector[:, chosen]
+            to.append(wide)
+            number.append(np.full(wide.shape[1], k))
+    basis = Basis(np.hstack(turn), np.hstack(rest), np.concatenate(group), np.concatenate(rest_group))
+    return Whitened(data.x @ basis.turn, data.y, data.samples, data.noise_dof), basis
+
+
+def draw_weights(data: Whitened, basis: Basis, log_scale, count: int, rng) -> np.ndarray:
+    """Exact draws (count, weights) of the weights given log scales."""
+    by_group = np.exp(np.clip(log_scale, *LOG_SCALES))
+    scale = by_group[basis.group]
+    inner = data.gram * np.outer(scale, scale)
+    inner[np.diag_indices_from(inner)] += 1.0
+    lower = cholesky(inner, lower=True, check_finite=False)
+    seen = solve_triangular(lower, scale * data.moment, lower=True, check_finite=False)
+    chi2 = max(data.total - float(seen @ seen), 0.0)
+    spread = np.sqrt((data.noise_dof + chi2) / rng.chisquare(data.noise_dof + data.samples, count))
+    noisy = seen[:, None] + spread * rng.standard_normal((scale.size, count))
+    standard = solve_triangular(lower, noisy, lower=True, trans=1, check_finite=False)
+    unseen = by_group[basis.rest_group, None] * rng.standard_normal((basis.rest_group.size, count)) * spread
+    return (basis.turn @ (scale[:, None] * standard) + basis.rest @ unseen).T
+
+
+ADAPTED = 160
+"""Points from which the proposal is refitted, twice."""
+
+
+def _adapted(target, move, seed) -> _Independence:
+    """The proposal refitted by importance sampling: the marginal posterior of log scales is skewed."""
+    random = np.random.RandomState(np.random.SeedSequence([seed, 99]).generate_state(4))
+    for _ in range(2):
+        new = move.draw(random, ADAPTED)
+        log_weight = target(new) - move.log_density(new)
+        weight = np.exp(0.5 * (log_weight - log_weight.max()))
+        weight /= weight.sum()
+        mean = weight @ new
+        apart = new - mean
+        covariance = (apart * weight[:, None]).T @ apart
+        spread = np.diag(move.root @ move.root.T)
+        move = _Independence(mean, np.linalg.cholesky(covariance + 0.02 * np.diag(spread)))
+    return move
+
+
+class _Target:
+    """Log posterior density of the free log scales, and how often it was evaluated."""
+
+    def __init__(self, data, group, scales, mode, free):
+        self.data, self.group, self.scales, self.mode, self.free = data, group, scales, mode, free
+        self.evaluations = 0
+
+    def __call__(self, points):
+        return np.array([self.one(p) for p in np.atleast_2d(points)])
+
+    def one(self, point) -> float:
+        """Density at one point (free scales,)."""
+        self.evaluations += 1
+        if np.any(point < LOG_SCALES[0]) or np.any(point > LOG_SCALES[1]):
+            return -np.inf
+        log_scale = self.mode.copy()
+        log_scale[self.free] = point
+        return self.data.log_marginal(np.exp(log_scale)[self.group]) + self.scales.log_prior(log_scale)
+
+
+def _laplace_root(target, mode) -> np.ndarray:
+    """Cholesky factor of the inverse Hessian at the mode, kept within the prior's width."""
+    size, step = mode.size, 0.15
+    hessian, unit = np.empty((size, size)), step * np.eye(size)
+    for i in range(size):
+        for j in range(i + 1):
+            ends = [target.one(mode + a * unit[i] + b * unit[j]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+            hessian[i, j] = hessian[j, i] = -(ends[0] - ends[1] - ends[2] + ends[3]) / (4 * step**2)
+    value, vector = np.linalg.eigh(hessian)
+    least = 1.0 / np.max(target.scales.sd) ** 2
+    return INFLATED * np.linalg.cholesky((vector / np.maximum(value, least)) @ vector.T)

@@ -1,0 +1,50 @@
+"""Where to begin: torque offset, lag and the drag's dependence on rate, from where the legs cross levels of the angle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.engine.reduced import Reduced
+from backdrive_bayes.mechanics.effect import Distortion
+
+LEVELS = np.linspace(-0.9, 0.9, 73)
+USUAL = np.array([0.05, 0.2, 1.0])
+"""Standard deviations by which the least squares are held: offset [torque scale], lag [torque scale a unit rate], exponent."""
+
+
+def possible_starts(reduced: Reduced) -> list[Distortion]:
+    """Distortions worth starting from: with offset alone, with a lag, with a drag exponent, with both."""
+    crossings = _crossings(reduced)
+    if len(crossings) < 3:
+        return [Distortion()]
+    context = reduced.context
+    torque = np.array([c[0] for c in crossings])
+    sign, record = np.array([c[1] for c in crossings]), np.array([c[2] for c in crossings])
+    base = np.median(torque, axis=0)
+    weight = 1.0 / (np.abs(np.gradient(base)) + 2e-4) ** 2
+    late = ((torque - base) * weight).sum(axis=1) / weight.sum()
+    at = max(float((np.abs(base) * weight).sum() / weight.sum()), 1e-3)
+    fastest = context.rate.max()
+    design = np.column_stack([np.ones(late.size), -sign, context.rate[record] / fastest, at * context.log_rate[record]])
+    held = np.diag(np.r_[0.0, 1e-2 / USUAL])
+    starts = []
+    for lag, drag in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        used = np.array([1, 1, lag, drag])
+        found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(4)], rcond=None)[0] * used
+        starts.append(Distortion(float(found[1]), float(found[2] / fastest), 0.0, float(np.clip(found[3], -0.5, 0.5))))
+    return starts
+
+
+def _crossings(reduced):
+    """Torque at LEVELS on every settled leg that spans most of the range, mirrored where it falls, with sign and record."""
+    found = []
+    for r, (blocks, angle) in enumerate(zip(reduced.blocks, reduced.angles, strict=True)):
+        legs = blocks.direction.size
+        settled = blocks.leg > 0 if legs > 1 else blocks.leg >= 0
+        middle = angle - 0.5 * (angle[settled].max() + angle[settled].min())
+        for k in range(1 if legs > 1 else 0, legs):
+            if abs(blocks.turning_nm[k + 1] - blocks.turning_nm[k]) > 1.2 * reduced.torque_scale_nm:
+                own, sign = blocks.leg == k, blocks.direction[k]
+                rising = np.maximum.accumulate(middle[own] * sign)
+                found.append((np.interp(LEVELS, rising, blocks.torque_nm[own] * sign / reduced.torque_scale_nm), sign, r))
+    return found

@@ -1,0 +1,94 @@
+"""What an effect is: columns whose weights are wide where it acts and at trace level where it does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backdrive_bayes.mechanics.history import History
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What effects may know of a unit; torques are shares of the largest torque, angles of the angle scale.
+
+    ``rate`` (records,) are loading rates [1/s], ``duration_s`` (records,); ``angle_noise`` and ``torque_noise`` standard deviations
+    of block means and of single torque samples.
+    """
+
+    torque_scale_nm: float
+    angle_scale_rad: float
+    rate: np.ndarray
+    duration_s: np.ndarray
+    angle_noise: float
+    torque_noise: float
+
+    @property
+    def log_rate(self) -> np.ndarray:
+        """Logarithms of the rates over their geometric mean, (records,)."""
+        return np.log(self.rate) - np.log(self.rate).mean()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A candidate effect.
+
+    ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring channel, ``per_record``
+    says whether each record has weights of its own. ``trace`` and ``present`` give the standard deviation of its (independent)
+    weights where it is a mere trace, as on every bench, and where it acts.
+    """
+
+    name: str
+    breaks: str
+    signature: str
+    source: str
+    unit: str = "1"
+    of_reducer: bool = True
+    per_record: bool = False
+
+    def trace(self, context: Context) -> float:
+        """Standard deviation of the weights at trace level."""
+        raise NotImplementedError
+
+    def present(self, context: Context) -> float:
+        """Typical standard deviation of the weights where the effect acts."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class PathEffect(Effect):
+    """An effect whose columns follow from the torque history alone."""
+
+    def responses(self, history: History, record: int, context: Context) -> tuple[np.ndarray, np.ndarray]:
+        """Its columns at the beginning and the end of every segment, (segments, columns) each."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class TangentEffect(Effect):
+    """An effect that moves a nonlinear parameter of the operator: its column is the derivative of the present prediction.
+
+    ``parameter`` is the place of the parameter in :class:`Distortion`, ``step`` the step of the difference quotient.
+    """
+
+    parameter: str = ""
+    step: float = 2e-5
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
+
+    ``offset`` is a share of the torque scale, ``lag_s`` in seconds; friction and drag thresholds grow with rate to these powers.
+    """
+
+    offset: float = 0.0
+    lag_s: float = 0.0
+    friction_exponent: float = 0.0
+    drag_exponent: float = 0.0
+
+    @property
+    def exponents(self) -> tuple[float, float]:
+        """Exponents of friction and drag."""
+        return self.friction_exponent, self.drag_exponent

@@ -1,0 +1,21 @@
+"""The angle channel is late against the torque channel."""
+
+from backdrive_bayes.mechanics.effect import TangentEffect
+
+
+class SensorLag(TangentEffect):
+    """The loop's width grows with rate times slope."""
+
+    def trace(self, context):
+        """The torque moves by half of its noise."""
+        return 0.5 * context.torque_noise / context.rate.max()
+
+    def present(self, context):
+        """The torque moves by some thousandths of the largest at the fastest rate."""
+        return 6e-3 / context.rate.max()
+
+
+SENSOR_LAG = SensorLag(
+    "sensor_lag", "rate independence", "width grows with rate times slope", "delay and first-order lag alike, to first order in the lag",
+    "s", False, False, "lag_s",
+)

@@ -1,0 +1,79 @@
+"""Delayed compliance of polymer gears."""
+
+import numba
+import numpy as np
+
+from backdrive_bayes.mechanics.effect import PathEffect
+
+TIMES = 8
+FRICTION = 0.04
+"""Threshold of the play through which half of the columns see the torque: creep behind friction."""
+
+
+class ViscoelasticCreep(PathEffect):
+    """Kelvin-Voigt elements over a range of time constants, driven by the torque and by the torque behind friction."""
+
+    def trace(self, context):
+        """A third of the angle noise."""
+        return 0.3 * context.angle_noise
+
+    def present(self, context):
+        """Three per cent of the angle scale."""
+        return 0.03
+
+    def times_s(self, context) -> np.ndarray:
+        """Time constants [s], from a thirtieth of the shortest record to half of the longest."""
+        return np.geomspace(0.03 * context.duration_s.min(), 0.5 * context.duration_s.max(), TIMES)
+
+    def responses(self, history, record, context):
+        """Delayed less instantaneous response at the segments' ends."""
+        times = self.times_s(context)
+        span = np.maximum(history.t1 - history.t0, 1e-12)
+        held = _play(history.z0[0], history.z1, FRICTION)
+        begin, end = [], []
+        for (z0, z1), chosen in (((history.z0, history.z1), times), ((held[:-1], held[1:]), times[::2])):
+            for time in chosen:
+                a, b = _delayed(z0, z1, span, time)
+                begin.append(a - z0)
+                end.append(b - z1)
+        mixing = _mixing(np.log(times))
+        return np.stack(begin, axis=1) @ mixing, np.stack(end, axis=1) @ mixing
+
+
+def _mixing(log_times):
+    near = np.exp(-np.abs(log_times[:, None] - log_times) / 1.5)
+    count, half = log_times.size, log_times[::2].size
+    mixing = np.zeros((count + half, count + half))
+    mixing[:count, :count] = np.linalg.cholesky(near)
+    mixing[count:, count:] = np.linalg.cholesky(0.5 * near[::2, ::2])
+    return mixing
+
+
+@numba.njit(cache=True, nogil=True)
+def _delayed(z0, z1, span, time):
+    """Response of a Kelvin-Voigt element at the segments' ends, exact for straight segments, at rest before the first."""
+    begin, end = np.empty(z0.size), np.empty(z0.size)
+    x = z0[0]
+    for i in range(z0.size):
+        begin[i] = x
+        slope = (z1[i] - z0[i]) / span[i]
+        x = z1[i] - slope * time + (x - z0[i] + slope * time) * np.exp(-span[i] / time)
+        end[i] = x
+    return begin, end
+
+
+@numba.njit(cache=True, nogil=True)
+def _play(first, z1, threshold):
+    """Output of a play operator at the first torque and at every segment's end, (segments + 1,)."""
+    out = np.empty(z1.size + 1)
+    out[0] = x = first
+    for i in range(z1.size):
+        x = min(max(x, z1[i] - threshold), z1[i] + threshold)
+        out[i + 1] = x
+    return out
+
+
+VISCOELASTIC_CREEP = ViscoelasticCreep(
+    "viscoelastic_creep", "rate independence", "relaxes with time constants of seconds", "Ferry, Viscoelastic Properties of Polymers, 1980, ch. 3",
+    "rad",
+)

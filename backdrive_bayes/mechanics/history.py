@@ -1,0 +1,67 @@
+"""A torque history as straight segments, each of which belongs to a block whose mean is wanted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backdrive_bayes.records.reduction import Blocks
+
+PIECES = 3
+"""Straight pieces a block: the torque within a block is nearly straight, turning points are nodes of their own."""
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Segments of a torque history; all but ``start`` and ``blocks`` have shape (segments,).
+
+    ``z0`` and ``z1`` are the torques at the ends as shares of the unit's largest torque, ``t0`` and ``t1`` the times [s], ``block``
+    the block that a segment belongs to and ``weight`` its share of the block's time.
+    """
+
+    z0: np.ndarray
+    z1: np.ndarray
+    t0: np.ndarray
+    t1: np.ndarray
+    block: np.ndarray
+    weight: np.ndarray
+    blocks: int
+
+    @property
+    def start(self) -> float:
+        """Torque before the first segment."""
+        return float(self.z0[0])
+
+    def mean(self, begin, end) -> np.ndarray:
+        """Block means (blocks, columns) of quantities that are straight on every segment, given at its ends (segments, columns)."""
+        out = np.zeros((self.blocks, begin.shape[1]))
+        np.add.at(out, self.block, 0.5 * (begin + end) * self.weight[:, None])
+        return out
+
+
+def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s: float = 0.0) -> History:
+    """History behind the blocks of a record.
+
+    ``offset`` is added to the torque that was read (a share of the scale), ``lag_s`` is by how much the angle channel is late.
+    """
+    ends = np.array([blocks.end_s[blocks.leg == k][-1] for k in range(blocks.direction.size)])
+    turns = np.r_[blocks.begin_s[0], ends]
+    time, torque = np.r_[turns, blocks.mid_s], np.r_[blocks.turning_nm, blocks.torque_nm]
+    order = np.argsort(time, kind="stable")
+    share = np.linspace(0.0, 1.0, PIECES + 1)
+    edges = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share - lag_s
+    cuts = np.unique(np.r_[edges.ravel(), turns[1:-1]])
+    z = np.interp(cuts, time[order], torque[order]) / torque_scale_nm + offset
+    owner = np.searchsorted(blocks.begin_s - lag_s, 0.5 * (cuts[1:] + cuts[:-1]), side="right") - 1
+    owner = np.clip(owner, 0, blocks.count.size - 1)
+    span = np.diff(cuts)
+    weight = span / np.bincount(owner, span, blocks.count.size)[owner]
+    return History(z[:-1], z[1:], cuts[:-1], cuts[1:], owner, weight, blocks.count.size)
+
+
+def through(time_s, torque_nm, torque_scale_nm: float) -> History:
+    """History straight between given samples; segment i ends at sample i + 1 and is a block of its own."""
+    z, count = np.asarray(torque_nm, float) / torque_scale_nm, len(torque_nm) - 1
+    time = np.asarray(time_s, float)
+    return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count)

@@ -1,0 +1,38 @@
+"""The effects that are known: a new one is a file and a line here, or an entry point of another package."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib.metadata import entry_points
+
+from backdrive_bayes.mechanics.effect import Effect
+from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
+from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_RATE, FRICTION_RATE
+from backdrive_bayes.mechanics.effects.sensor_lag import SENSOR_LAG
+from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
+from backdrive_bayes.mechanics.effects.torque_offset import TORQUE_OFFSET
+from backdrive_bayes.mechanics.effects.unexplained import UNEXPLAINED
+from backdrive_bayes.mechanics.effects.viscoelastic_creep import VISCOELASTIC_CREEP
+
+LIBRARY: dict[str, tuple[Effect, ...]] = {
+    "torque_offset": (TORQUE_OFFSET,),
+    "sensor_lag": (SENSOR_LAG,),
+    "rate_dependent_friction": (FRICTION_RATE, DRAG_RATE),
+    "thermal_drift": (THERMAL_DRIFT,),
+    "asymmetric_stiffness": (ASYMMETRIC_STIFFNESS,),
+    "viscoelastic_creep": (VISCOELASTIC_CREEP,),
+}
+"""Effects by the name that an answer gives them, each with the terms that it consists of."""
+
+
+@lru_cache(maxsize=1)
+def all_effects() -> dict[str, tuple[Effect, ...]]:
+    """The library and the effects of installed packages (entry point group backdrive_bayes.effects)."""
+    found = dict(LIBRARY)
+    for point in entry_points(group="backdrive_bayes.effects"):
+        effect = point.load()
+        found[effect.name] = effect if isinstance(effect, tuple) else (effect,)
+    return found
+
+
+UNKNOWN = UNEXPLAINED
