@@ -29,12 +29,27 @@ process = {mean = 3e-4, sd = 1e-5}
 consumer = 0.05
 producer = 0.10
 """
-CLAIMS = """[[claim]]
-claim = "the first is stiffer"
-predicate = "first.peak_angle_rad < second.peak_angle_rad"
+CLAIMS = """schema = "backdrive-bayes/claims/1"
+
+[[claim]]
+text = "A turns less than B at every rate"
+holds = "A.peak_angle_rad < B.peak_angle_rad"
+every = "rate"
+
+[[claim]]
+text = "The lost motion of A is below 34 arcmin, whatever the rate"
+holds = "largest(A.lost_motion_rad) < 34*arcmin + 2*A.loop_area_J(rate=0.05)"
+along = "rate"
 """
-TEMPLATE = """name = "Bench Ltd."
-footer = "confidential"
+TEMPLATE = """schema = "backdrive-bayes/template/1"
+company = "Example Drives Ltd"
+address = ["Test laboratory, hall 4"]
+footer = "TR-0815"
+[colours]
+headings = "#0b3c5d"
+[fields]
+Customer = "Robotics & Sons"
+Calibrated = 2024-03-01
 """
 
 

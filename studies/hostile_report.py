@@ -30,6 +30,7 @@ def _fuzz_table(fuzz: list[dict]):
         slowest, most = max(row["seconds"] for row in rows), max(row["peak_MB"] for row in rows)
         failed = sum(bool(row["faults"]) for row in rows)
         yield f"| {name} | {len(rows)} | {count[0]} | {count[1]} | {failed} | {slowest:.1f} s | {most:.0f} MB |"
+    yield "\nOf history, limits, claims and template files the other arguments are missing, so that a sound one is refused too."
     yield ""
 
 

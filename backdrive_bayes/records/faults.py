@@ -15,6 +15,7 @@ _GAP_STEPS = 5.0
 _WILD_SD = 12.0
 _PLATEAU_TIMES = 4.0  # a triangle spends 5 % of its time in the top 5 %; so many times that is no triangle
 _MOST_LISTED = 20
+_FROZEN_SHARE = 0.3  # of the other channel's range passed while one stood exactly still
 
 
 def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:
@@ -85,6 +86,11 @@ def longest_frozen(values: np.ndarray, other: np.ndarray) -> dict:
     moved = float(np.ptp(means))
     span = float(np.ptp(other))
     return {"start": start, "samples": stop - start, "other_share": moved / span if span > 0.0 else 0.0}
+
+
+def stands_still(frozen: dict) -> bool:
+    """Whether a run of equal values, as from ``longest_frozen``, is a frozen channel and no quantised one."""
+    return frozen["samples"] >= 20 and frozen["other_share"] > _FROZEN_SHARE
 
 
 def quantum(values: np.ndarray) -> float | None:

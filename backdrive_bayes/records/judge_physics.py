@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from backdrive_bayes.records.faults import stands_still
 from backdrive_bayes.records.findings import Finding
 from backdrive_bayes.records.signs import inverted, not_answering
 from backdrive_bayes.records.wraps import LARGEST_STEP_RAD, TURN_RAD
@@ -22,7 +23,8 @@ def judge_physics(found: dict, columns: dict[str, str]):
     yield from _jumps(found["angle_jumps"])
     yield from _range(found)
     loop = found["measured_loop"]
-    if found["energy_given"]:
+    # A frozen channel draws loops of any direction and is told for itself.
+    if found["energy_given"] and not any(stands_still(frozen) for frozen in found["frozen"].values()):
         yield Finding(
             "error",
             "loop_reversed",

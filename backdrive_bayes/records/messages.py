@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
+from backdrive_bayes.records.faults import stands_still
 from backdrive_bayes.records.findings import Finding
 
 _ARCMIN = 10800.0 / math.pi
-_FROZEN_SHARE = 0.3  # of the other channel's range passed while one stood exactly still
 
 
 def judge_record(found: dict, rated_torque_nm: float):
@@ -49,7 +49,7 @@ def _channels(found, _):
                 f"(drop-outs or spikes)",
             )
         frozen = found["frozen"][channel]
-        if frozen["samples"] >= 20 and frozen["other_share"] > _FROZEN_SHARE:
+        if stands_still(frozen):
             yield Finding(
                 "error", "frozen",
                 f"{channel} stands still for {frozen['samples']} samples from sample "
