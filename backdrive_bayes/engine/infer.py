@@ -89,4 +89,4 @@ def _priors(linear, hypothesis):
 def _facts(reduced: Reduced) -> RecordFacts:
     rate = reduced.context.rate * reduced.torque_scale_nm
     amplitude = np.array([np.abs(b.turning_nm).max() for b in reduced.blocks])
-    return RecordFacts(tuple(b.name for b in reduced.blocks), rate, amplitude, reduced.blocks)
+    return RecordFacts(tuple(b.name for b in reduced.blocks), rate, amplitude, reduced.blocks, reduced.noise)

@@ -15,12 +15,13 @@ from backdrive_bayes.mechanics.reducer import ReducerClass
 
 @dataclass(frozen=True, eq=False)
 class RecordFacts:
-    """What a posterior keeps of each record: names, rates [N·m/s], amplitudes [N·m], and the blocks (tuples over records)."""
+    """What a posterior keeps of each record: names, rates [N·m/s], amplitudes [N·m], blocks and noise (tuples over records)."""
 
     names: tuple[str, ...]
     rate_nm_per_s: np.ndarray
     amplitude_nm: np.ndarray
     blocks: tuple
+    noise: tuple
 
     @property
     def count(self) -> int:
@@ -34,7 +35,8 @@ class Posterior:
 
     ``weights`` maps groups to arrays (chains, draws, weights) in shares of the angle scale, ``log_scale`` to arrays (chains, draws);
     tangent effects' weights are values of their parameter. ``predicted_rad`` and ``residual`` hold the mode's block means and whitened
-    residuals by record. ``hypothesis`` names the effects that are present (None: every effect at a scale of its own).
+    residuals by record. ``hypothesis`` names the effects that are present (None: every effect at a scale of its own), ``jitter`` is
+    standard deviation and correlation length of the crossing torques [N·m], ``doubts`` say what in the measurement speaks against it.
     """
 
     unit_name: str
@@ -56,11 +58,12 @@ class Posterior:
     seed: int
     hypothesis: tuple[str, ...] | None = None
     jitter: tuple[float, float] = (0.0, 0.0)
+    doubts: tuple[str, ...] = ()
 
     @property
     def converged(self) -> bool:
-        """Whether every log scale and indicator passed the diagnostics."""
-        return self.convergence.converged
+        """Whether every log scale and indicator passed the diagnostics and the measurement does not contradict."""
+        return self.convergence.converged and not self.doubts
 
     @property
     def shape(self) -> tuple[int, int]:
