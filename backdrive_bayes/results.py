@@ -12,7 +12,7 @@ DIAGNOSIS = "backdrive-bayes/diagnosis/1"
 VERDICT = "backdrive-bayes/verdict/1"
 COMPARISON = "backdrive-bayes/comparison/1"
 BLIND = "backdrive-bayes/blind/1"
-POSTERIOR = "backdrive-bayes/posterior/1"
+POSTERIOR = "backdrive-bayes/posterior/2"
 
 
 def read_result(path: Path, schema: str) -> dict:

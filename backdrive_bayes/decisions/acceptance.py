@@ -126,8 +126,8 @@ def _together(structure, judged) -> list[float]:
 def _verdict(structure: Structure, risks: Risks, limits: Limits) -> tuple[Verdict, str]:
     bad = [m.evidence for m in structure.models if not m.evidence.converged]
     if bad:
-        advised = bad[0].about["convergence"].get("advice") or "sample longer"
-        return Verdict.INCONCLUSIVE, f"the sampling has not converged: {advised.partition(': ')[2] or advised}"
+        advised = bad[0].about["convergence"].get("advice") or "check the records"
+        return Verdict.INCONCLUSIVE, f"the fit is not to be used: {advised}"
     verdict = risks.verdict(limits.consumer, limits.producer)
     if verdict is Verdict.ACCEPTED:
         return verdict, f"the risk that it is out of limits, {_p(risks.consumer)}, is at most the agreed {_p(limits.consumer)}"
@@ -175,7 +175,6 @@ def _row(structure: Structure, judged: Judged, limits: Limits, batch) -> dict:
         "verdict": risks.verdict(limits.consumer, limits.producer).value if first.converged else Verdict.INCONCLUSIVE.value,
         "guard_band": {"below_max": upper, "above_min": lower},
         "accept_median_between": [limit.lo + lower, limit.hi - upper],
-        "model_error_share": first.model_error_share(limit.indicator, loop),
         "naive": _naive(first, limit, loop),
         "histogram": _histogram(mixed),
     }
@@ -238,7 +237,7 @@ def _next(structure: Structure, verdict: Verdict, rows: list[dict], limiting: in
         return None
     row, repeats = rows[limiting], None
     if not all(m.evidence.converged for m in structure.models):
-        text = "Fit again with a longer budget (--budget); nothing needs to be measured for that."
+        text = _unusable(structure)
     elif structure.unknown > min(limits.consumer, limits.producer):
         test = (structure.models[0].evidence.diagnosis or {}).get("next_test") or {}
         text = f"Explain the gap first. {test.get('do') or _EXPLAIN}"
@@ -252,6 +251,13 @@ def _next(structure: Structure, verdict: Verdict, rows: list[dict], limiting: in
         "repeats_in_all": repeats,
         "do": text,
     }
+
+
+def _unusable(structure: Structure) -> str:
+    convergence = next(m.evidence.about["convergence"] for m in structure.models if not m.evidence.converged)
+    if convergence.get("contradictions"):
+        return "Check the records: the posterior contradicts what was measured, so the model does not fit these data."
+    return "Check the records, and leave out those that differ most from the others: the sampling does not converge on them."
 
 
 def with_risk(limits: Limits, consumer: float | None = None, producer: float | None = None) -> Limits:

@@ -184,10 +184,10 @@ def _near(overlay, loop) -> bool:
 
 
 def _mechanism(evidence: Evidence, name: str, level: float) -> dict:
-    """How a unit releases energy: shares of S by geometric error, friction and model error, elastic share of W_abs."""
+    """How a unit releases energy: shares of S by geometric error, friction and effects, elastic share of W_abs."""
     rows = []
     for loop in evidence.measured:
-        values = {key: evidence.draws[key].values[..., list(loop.records)].mean(axis=-1).ravel() for key in MECHANISM}
+        values = {key: evidence.draws.values(key, loop.rate, loop.amplitude) for key in MECHANISM}
         values["rest_over_S"] = 1 - values["S_g_over_S"] - values["S_f_over_S"]
         shown = {k: None if np.isnan(v).any() else _interval(v, level) for k, v in values.items()}
         rows.append({"loading_rate_Nm_per_s": loop.rate, "amplitude_Nm": loop.amplitude} | shown)

@@ -1,21 +1,43 @@
-"""What decisions rest on: the saved draws of one unit's indicators, asked by rate and amplitude."""
+"""What decisions rest on: draws of one unit's indicators, asked by rate and amplitude."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from backdrive_bayes.decisions.loops import SAME_AMPLITUDE, Loop, NotAvailable, find_loop, largest_loops, measured_loops, same
-from backdrive_bayes.decisions.prediction import LogError, error_between, shifted
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.engine.posterior_file import as_saved
+from backdrive_bayes.engine.posterior_read import read_posterior
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.indicators.draws import CORE, indicator_draws
-from backdrive_bayes.inference.fit import Posterior
-from backdrive_bayes.inference.posterior_file import attributes_of
-from backdrive_bayes.results import DIAGNOSIS, INDICATORS, read_group, read_result
+from backdrive_bayes.indicators.draws import IndicatorDraws
+from backdrive_bayes.results import DIAGNOSIS, INDICATORS, read_result
+
+
+class Draws(Protocol):
+    """What evidence asks of draws; :class:`~backdrive_bayes.indicators.draws.IndicatorDraws` is it for a posterior."""
+
+    rates: np.ndarray
+    amplitudes: np.ndarray
+    rated_torque_nm: float
+    kept: np.ndarray
+    parameters: dict[str, np.ndarray]
+
+    def values(self, name: str, rate: float, amplitude: float, kept: bool = False) -> np.ndarray:
+        """An indicator of a loop, of all or the kept draws."""
+
+    def width_torques(self, amplitude: float) -> np.ndarray:
+        """Torques at which the width of a loop is told."""
+
+    def widths(self, rate: float, amplitude: float) -> np.ndarray:
+        """Width of the kept draws' loops there."""
+
+    def sensitivity(self, response: str, parameter: str) -> np.ndarray:
+        """d ln(response) / d ln(parameter) of the kept draws."""
 
 
 def same_lost_motion(evidences) -> None:
@@ -28,38 +50,32 @@ def same_lost_motion(evidences) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Draws of one unit under one model; ``about`` is its indicators object, ``draws`` the group of the same name.
-
-    ``parameters`` maps shared parameters to draws (draws,) in SI units; ``diagnosis`` is a diagnosis object or None.
-    """
+    """Draws of one unit under one model; ``about`` is its indicators object, ``diagnosis`` a diagnosis object or None."""
 
     about: dict
-    draws: object
-    parameters: dict[str, np.ndarray]
+    draws: Draws
     diagnosis: dict | None = None
     where: str = ""
-    _log_errors: dict = field(default_factory=dict, repr=False)
 
     @classmethod
     def read(cls, folder: Path) -> Evidence:
-        """From a result folder of a fit; BadInput where it is none or comes from a version that saved no draws."""
+        """From a result folder of a fit; BadInput where it is none or its files are not of the same data."""
         folder = Path(folder)
         about = read_result(folder / "indicators.json", INDICATORS)
         if not (folder / "posterior.nc").is_file():
             raise BadInput(folder, "a result folder with posterior.nc", "none")
-        posterior = read_group(folder / "posterior.nc", "posterior")
+        posterior = read_posterior(folder / "posterior.nc")
         path = folder / "diagnosis.json"
         diagnosis = read_result(path, DIAGNOSIS) if path.is_file() else None
-        shared = {str(n): v.values.ravel() for n, v in posterior.items() if v.dims == ("chain", "draw")}
-        return cls(about, _indicator_group(folder / "posterior.nc"), shared, diagnosis, str(folder))
+        _require_same_data(folder / "posterior.nc", about, {"data_sha256": list(posterior.data_hashes)})
+        if diagnosis is not None:
+            _require_same_data(path, about, diagnosis)
+        return cls(about, IndicatorDraws(posterior, _k(folder, about)), diagnosis, str(folder))
 
     @classmethod
     def of(cls, posterior: Posterior, about: dict) -> Evidence:
         """From a posterior in memory and its indicators object."""
-        physical = posterior.problem.physical(posterior.z)
-        shared = {c.parameter.name: physical[:, i] for i, c in enumerate(posterior.problem.coordinates) if c.record is None}
-        draws = indicator_draws(posterior, about["k"])
-        return cls(about, draws.assign_attrs(attributes_of(posterior) | draws.attrs), shared)
+        return cls(about, IndicatorDraws(as_saved(posterior), about["k"]))
 
     @property
     def name(self) -> str:
@@ -68,7 +84,7 @@ class Evidence:
 
     @property
     def converged(self) -> bool:
-        """Whether the sampling converged."""
+        """Whether the sampling converged and the measurement does not contradict."""
         return bool(self.about["convergence"]["converged"])
 
     @property
@@ -79,17 +95,22 @@ class Evidence:
     @property
     def rated_torque(self) -> float:
         """T_r [N·m]."""
-        return float(self.draws.attrs["rated_torque_nm"])
+        return float(self.draws.rated_torque_nm)
 
     @cached_property
     def kept(self) -> np.ndarray:
-        """Numbers of the draws for which smaller amplitudes are known."""
-        return self.draws["kept"].values
+        """Numbers of the draws that are used where many loops are wanted."""
+        return self.draws.kept
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The user's parameters by name, (draws,) each, SI units."""
+        return self.draws.parameters
 
     @cached_property
     def measured(self) -> tuple[Loop, ...]:
         """The measured loops in order of rate and amplitude; repeats of a record are one loop."""
-        return measured_loops(self.draws["loading_rate_Nm_per_s"].values, self.draws["amplitude_Nm"].values)
+        return measured_loops(self.draws.rates, self.draws.amplitudes)
 
     @property
     def rates(self) -> list[float]:
@@ -107,68 +128,12 @@ class Evidence:
     def values(self, name: str, loop: Loop, kept: bool = False) -> np.ndarray:
         """Draws of an indicator, shape (draws,); of the kept draws where ``kept`` or the loop is predicted.
 
-        Repeats of a record count as one loop: the mean of their draws. Raises NotAvailable where it is not defined.
+        Raises NotAvailable where it is not defined.
         """
-        if loop.predicted:
-            values = self.predicted(name, loop)
-        else:
-            values = self.draws[name].values[..., list(loop.records)].mean(axis=-1).ravel().astype(float)
-            values = values[self.kept] if kept else values
+        values = self.draws.values(name, loop.rate, loop.amplitude, kept or loop.predicted)
         if not np.isfinite(values).all():
             raise NotAvailable(f"{name} is not defined at {loop.text}")
         return values
-
-    def predicted(self, name: str, loop: Loop) -> np.ndarray:
-        """Kept draws of a core indicator of a loop within its records' amplitude, with the prediction's own error (draws,)."""
-        if name not in CORE:
-            raise NotAvailable(f"{name} is known at measured amplitudes only, not at {loop.text}")
-        if name == "loop_area_J":
-            return self.predicted("dissipation_ratio", loop) * self.predicted("absorbed_J", loop)
-        ratio = np.log(loop.amplitude / self._measured_amplitude(loop))
-        return shifted(name, self._bare_prediction(name, loop), self._log_error(name).at(ratio))
-
-    def _measured_amplitude(self, loop):
-        return float(self.draws["position_Nm"].values[list(loop.records), -1].mean())
-
-    def _log_error(self, name) -> LogError:
-        if name not in self._log_errors:
-            # One stream an indicator: the same answer in whatever order questions are asked.
-            rng = np.random.default_rng([5, CORE.index(name)])
-            self._log_errors[name] = LogError(self._seen_errors(name), self.kept.size, rng)
-        return self._log_errors[name]
-
-    def _seen_errors(self, name):
-        """Log amplitude ratio and log error (draws,) of every measured loop that a larger one of its rate predicts."""
-        seen = []
-        for loop in self.measured:
-            top = self.loop(loop.rate)
-            if loop is top:
-                continue
-            try:
-                told = self._bare_prediction(name, Loop(top.rate, loop.amplitude, top.records, True))
-                found = self.values(name, loop, kept=True)
-            except NotAvailable:
-                continue
-            if (told > 0).all() and (found > 0).all():
-                seen.append((float(np.log(loop.amplitude / self._measured_amplitude(top))), error_between(name, found, told)))
-        return seen
-
-    def _bare_prediction(self, name, loop):
-        parts = []
-        for r in loop.records:
-            position = self.draws["position_Nm"].values[r]
-            values = self.draws[f"{name}_by_amplitude"].values[:, r].astype(float)
-            known = np.isfinite(values).all(axis=0)
-            if known.sum() < 2 or not position[known][0] <= loop.amplitude * (1 + 1e-9):
-                raise NotAvailable(f"{name} is not defined at {loop.text}")
-            parts.append(PchipInterpolator(position[known], values[:, known], axis=1)(loop.amplitude))
-        return np.mean(parts, axis=0)
-
-    def model_error_share(self, name: str, loop: Loop) -> float | None:
-        """Share of an indicator's variance that is due to model error; None where it was not kept."""
-        if name not in CORE:
-            return None
-        return float(self.draws["model_error_share"].values[CORE.index(name), list(loop.records)].mean())
 
     def record_json(self, loop: Loop) -> dict:
         """The record object of a loop's first record."""
@@ -176,15 +141,21 @@ class Evidence:
 
     @property
     def reproduction(self) -> dict:
-        """Data hash, seed, versions and model of the fit."""
-        a = self.draws.attrs
-        found = {k: a[k].item() if hasattr(a[k], "item") else a[k] for k in ("data_sha256", "seed", "versions") if k in a}
+        """Data hashes, seed, versions and model of the fit."""
+        found = {key: self.about[key] for key in ("data_sha256", "seed", "versions") if key in self.about}
         return found | {"model": self.about["model"], "folder": Path(self.where).name}
 
 
-def _indicator_group(path: Path):
-    try:
-        return read_group(path, "indicators")
-    except BadInput as error:
-        found = "a posterior without them (fit the unit again with this version)"
-        raise BadInput(path, "a posterior.nc that holds draws of the indicators", found) from error
+def _k(folder, about) -> float:
+    k = about.get("k")
+    if isinstance(k, bool) or not isinstance(k, int | float) or not 0 < k < 1:
+        raise BadInput(folder / "indicators.json, key k", "a share between 0 and 1", repr(k)[:40])
+    return float(k)
+
+
+def _require_same_data(path, about, other) -> None:
+    """BadInput where two results of a folder name different data; one that names none is let through."""
+    hashes = [r.get("data_sha256") for r in (about, other)]
+    if all(hashes) and hashes[0] != hashes[1]:
+        shown = [", ".join(str(x)[:12] for x in ([h] if isinstance(h, str) else h)) for h in hashes]
+        raise BadInput(path, f"data with SHA-256 {shown[0]}, as indicators.json has", shown[1])

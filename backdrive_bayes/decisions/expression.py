@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.decisions.series import FUNCTIONS
+from backdrive_bayes.engine.parameters import PARAMETERS
 from backdrive_bayes.indicators.draws import UNITS
-from backdrive_bayes.model.registry import MEMBERS
 
 CONSTANTS = {"arcmin": math.pi / 10800, "mJ": 1e-3}
 LONGEST, MOST_NODES = 600, 150
@@ -221,7 +221,7 @@ def _unit(node) -> str:
 
 def _unit_of_parameter(node) -> str:
     wanted = getattr(node.args[0], "value", None) if node.args else None
-    return next((p.unit for m in MEMBERS.values() for p in m.parameters if p.name == wanted), "")
+    return next((p.unit for p in PARAMETERS if p.name == wanted), "")
 
 
 def _same_quantity(a, b):

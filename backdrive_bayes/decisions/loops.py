@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.indicators.draws import POSITIONS
-
+SMALLEST = 0.05
+"""Smallest amplitude that is predicted, as a share of the measured one."""
 SAME_RATE = 0.1
 """Relative difference up to which two loading rates are the same."""
 SAME_AMPLITUDE = 0.02
@@ -88,7 +88,7 @@ def find_loop(measured, rate: float, amplitude: float | None = None) -> Loop:
     if amplitude > top.amplitude:
         most = f"{top.amplitude:.3g} N·m at {top.rate:.3g} N·m/s"
         raise NotAvailable(f"amplitude {amplitude:.3g} N·m lies beyond the measured {most}")
-    lowest = top.amplitude / POSITIONS
+    lowest = top.amplitude * SMALLEST
     if amplitude < lowest:
         raise NotAvailable(f"amplitude {amplitude:.3g} N·m is below {lowest:.3g} N·m, the smallest that is predicted")
     return Loop(top.rate, float(amplitude), top.records, True)

@@ -14,13 +14,12 @@ def repeats_to_settle(rows, consumer: float, producer: float) -> int | None:
     """Measurements in all, the present one included, after which one risk would be at most the agreed one.
 
     Supposes that every row's median stays, that limits are kept or broken independently, and that repeats shrink the variance as
-    1/n but for its ``model_error_share``, which is the same in every repeat. None where no number up to ``MOST`` would do.
+    1/n. None where no number up to ``MOST`` would do.
     """
     n = np.arange(2, MOST + 1)
     within = np.ones(n.size)
     for row in rows:
-        shared = row["model_error_share"] or 0.0
-        spread = max(row["sd"], 1e-300) * np.sqrt(shared + (1 - shared) / n)
+        spread = max(row["sd"], 1e-300) / np.sqrt(n)
         within = within * normal_conformance(row["median"], spread, row["min"], row["max"])
     settled = (1 - within <= consumer) | (within <= producer)
     return int(n[np.argmax(settled)]) if settled.any() else None
@@ -35,12 +34,6 @@ def advice(row: dict, repeats: int | None) -> str:
         extra = repeats - 1
         text = f"Repeat the records {extra} time{'s'[: extra != 1]} more, first the loop at {where}, mounting the unit anew: "
         return text + f"{repeats} of each in all would settle the verdict if the medians stay."
-    share = row["model_error_share"]
-    if share and share > 0.5:
-        return (
-            f"Repeats will not settle {row['indicator']} at {where}: {share:.0%} of its variance is model error, which is the "
-            "same in every repeat. Diagnose the gap and fit with the effect that it names, or measure at further amplitudes."
-        )
     return (
         f"{row['indicator']} at {where} lies so near to its limit that {MOST} repeats would not settle it: the unit is on the "
         "limit; agree on other risks or judge it as it is."

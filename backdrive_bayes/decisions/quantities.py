@@ -7,7 +7,7 @@ import numpy as np
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.expression import Wrong
 from backdrive_bayes.decisions.loops import Loop, NotAvailable
-from backdrive_bayes.indicators.draws import CORE, RESPONSES
+from backdrive_bayes.indicators.draws import CORE, MOVED, POSITIONS, RESPONSES
 
 PAIRINGS = 8
 _CLASSIC = ("r_squared", "rms_rad", "rms_high_load_over_rest")
@@ -44,7 +44,7 @@ class Quantities:
         return along, look_up
 
     def _positions(self, evidence, loop: Loop, claim):
-        t = evidence.draws["position_Nm"].values[loop.records[0]]
+        t = loop.amplitude * np.arange(1, POSITIONS + 1) / POSITIONS
         chosen = t[(t >= claim.low * (1 - 1e-6)) & (t <= claim.high * (1 + 1e-6))]
         if chosen.size < 2:
             raise NotAvailable(f"fewer than two amplitudes between {claim.low:g} and {claim.high:g} N·m")
@@ -78,20 +78,12 @@ class Quantities:
             raise NotAvailable(f"{name} is not known along the amplitude")
         # All amplitudes from one record, so that steps between records are no part of the series.
         top = evidence.loop(keywords.get("rate", rates[0]))
-        loops = [Loop(top.rate, float(t), top.records, True) for t in np.minimum(along, _highest(evidence, top))]
-        return np.stack([self._one(evidence, name, x)[order] for x in loops], axis=1)
-
-    @staticmethod
-    def _one(evidence, name, loop):
-        if loop.amplitude >= _highest(evidence, loop) * (1 - 1e-6):
-            return evidence.values(name, Loop(loop.rate, loop.amplitude, loop.records), kept=True)
-        return evidence.values(name, loop)
+        loops = [Loop(top.rate, float(t), top.records, True) for t in np.minimum(along, top.amplitude)]
+        return np.stack([evidence.values(name, x)[order] for x in loops], axis=1)
 
     def _width(self, evidence, order, loop: Loop, keywords, along, claim):
-        if loop.predicted:
-            raise NotAvailable(f"the loop's width is known at measured amplitudes only, not at {loop.text}")
         torque = _curve_torques(evidence, loop)
-        width = evidence.draws["width_rad"].values[:, list(loop.records)].mean(axis=1).astype(float)
+        width = evidence.draws.widths(loop.rate, loop.amplitude)
         if "torque" in keywords or claim.along != "torque":
             if "torque" not in keywords:
                 raise Wrong("expected width_rad(torque=…) or along = \"torque\"")
@@ -105,21 +97,17 @@ class Quantities:
     def _sensitivity(self, evidence, arguments):
         if len(arguments) != 2 or arguments[0] not in RESPONSES:
             raise Wrong(f"expected sensitivity('response', 'parameter') with a response out of {', '.join(RESPONSES)}")
-        names = [str(n) for n in evidence.draws["parameter"].values]
+        names = [name for name in MOVED if name in evidence.parameters]
         if arguments[1] not in names:
-            raise NotAvailable(f"parameter {arguments[1]} is not in the model (it has {', '.join(names)})")
-        values = evidence.draws["sensitivity"].values[:, RESPONSES.index(arguments[0]), names.index(arguments[1])].astype(float)
+            raise NotAvailable(f"sensitivities to {arguments[1]} are not known (to {', '.join(names)} they are)")
+        values = evidence.draws.sensitivity(arguments[0], arguments[1])
         if not np.isfinite(values).all():
             raise NotAvailable(f"{arguments[0]} vanishes in the model")
         return np.resize(values, self.draws)[:, None]
 
 
-def _highest(evidence, loop) -> float:
-    return float(evidence.draws["position_Nm"].values[loop.records[0], -1])
-
-
 def _curve_torques(evidence, loop):
-    return evidence.draws["width_torque_Nm"].values[loop.records[0]]
+    return evidence.draws.width_torques(loop.amplitude)
 
 
 def _interpolate(torque, curves, at):

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from backdrive_bayes.engine.diagnostics import Convergence
-from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
@@ -33,10 +33,11 @@ class RecordFacts:
 class Posterior:
     """Draws of one unit.
 
-    ``weights`` maps groups to arrays (chains, draws, weights) in shares of the angle scale, ``log_scale`` to arrays (chains, draws);
-    tangent effects' weights are values of their parameter. ``predicted_rad`` and ``residual`` hold the mode's block means and whitened
-    residuals by record. ``hypothesis`` names the effects that are present (None: every effect at a scale of its own), ``jitter`` is
-    standard deviation and correlation length of the crossing torques [N·m], ``doubts`` say what in the measurement speaks against it.
+    ``weights`` maps groups to arrays (chains, draws, weights) in shares of the angle scale, ``log_scale`` to arrays (chains,
+    draws); tangent effects' weights are values of their parameter. ``predicted_rad`` and ``residual`` hold the mode's block means
+    and whitened residuals by record. ``hypothesis`` names the effects that are present (None: each at a scale of its own),
+    ``jitter`` is standard deviation and correlation length of the crossing torques [N·m], ``doubts`` say what in the measurement
+    speaks against it.
     """
 
     unit_name: str
@@ -108,6 +109,10 @@ class Posterior:
                 continue
             if isinstance(effect, PathEffect):
                 found = found + self.flat[effect.name] @ effect.responses(history, 0, self.context)[1].T
+            elif isinstance(effect, FlankEffect):
+                mean = {n: self.flat[n].mean(axis=0) for n in base}
+                even = self.reducer.flank_columns(history, mean, self.distortion.exponents, log_rate, ends=True)
+                found = found + self.flat[effect.name] @ even.T
             elif isinstance(effect, TangentEffect):
                 moved = replace(self.distortion, **{effect.parameter: getattr(self.distortion, effect.parameter) + effect.step})
                 there = self.reducer.ends(history, moved.exponents, log_rate)

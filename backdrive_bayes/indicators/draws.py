@@ -1,26 +1,20 @@
-"""Draws of the indicators, saved with the posterior: what decisions are made from, without sampling again."""
+"""Draws of the indicators of any loop of one unit: what summaries, decisions and claims are made from."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
+
 import numpy as np
 
+from backdrive_bayes.engine.parameters import posterior_parameters
+from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators import indicators as ind
-from backdrive_bayes.indicators.loop import (
-    discrepancy_loops,
-    model_loops,
-    module_loops,
-    record_amplitude_nm,
-    torque_grid,
-)
-from backdrive_bayes.indicators.other_loops import OtherLoops
-from backdrive_bayes.indicators.summary import core_indicators, loading_rate_nm_per_s
-from backdrive_bayes.inference.fit import Posterior
+from backdrive_bayes.indicators.loop import Loops, cut_loops, loop_grid, settled_history, settled_loops
 
-KEPT = 500
-"""Draws kept of everything that depends on an amplitude or a torque."""
+KEPT_A_CHAIN = 100
+"""Draws of each chain that are used where many loops are wanted."""
 POSITIONS = 20
 WIDTH_POINTS = 81
-SENSITIVITY_DRAWS = 100
 STEP = 0.02
 """Change of a parameter's logarithm by which sensitivities are taken."""
 UNITS = {
@@ -44,140 +38,150 @@ UNITS = {
 """Every indicator on which a limit, a comparison or a claim may rest, with its unit."""
 CORE = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
 RESPONSES = ("theta_L_rad", "W_L_J", "loop_area_J", "S_g_J", "S_f_J")
+MOVED = {
+    "clearance_rad": ("clearance", "free_play"),
+    "compliance_rated_rad_per_Nm": ("elastic", "friction"),
+    "drag_torque_Nm": (),
+    "friction_torque_Nm": (),
+}
+"""Parameters that have sensitivities, with the parts whose weights grow with them; the torques widen thresholds instead."""
 
 
-def indicator_draws(posterior: Posterior, k: float):
-    """The group ``indicators`` of a posterior file as an xarray dataset of float32.
+@dataclass(frozen=True, eq=False)
+class IndicatorDraws:
+    """Indicators of settled loops of any amplitude and rate of one posterior, lost motion at ±``k`` T_r.
 
-    Indicators have dimensions (chain, draw, record). For ``kept`` draws, whose numbers in the flat list of draws are that
-    coordinate, there are the core indicators of loops of smaller amplitude, ``…_by_amplitude`` (kept, record, position), the
-    loop's ``width_rad`` (kept, record, point), and log sensitivities (sensed, response, parameter). Undefined is NaN.
+    ``kept`` are the numbers of the draws, out of the flat list, that are used where many loops are wanted.
     """
-    import xarray
 
-    problem, rated = posterior.problem, posterior.problem.model.scale.torque_nm
-    shape, records = posterior.ensembles.z.shape[:2], range(len(posterior.problem.records))
-    kept = np.linspace(0, len(posterior.z) - 1, min(KEPT, len(posterior.z))).astype(int)
-    own = [_of_record(posterior, r, k * rated, rated, kept) for r in records]
-    small = [_smaller(posterior, r, k * rated, kept) for r in records]
-    variables = {}
-    for name in own[0][0]:
-        values = np.stack([o[0].get(name) for o in own], axis=-1).reshape(*shape, -1).astype(np.float32)
-        variables[name] = (("chain", "draw", "record"), values, {"unit": UNITS[name]})
-    for name in CORE:
-        values = np.stack([s[name] for s in small], axis=1).astype(np.float32)
-        variables[f"{name}_by_amplitude"] = (("kept", "record", "position"), values, {"unit": UNITS[name]})
-    amplitude = np.array([record_amplitude_nm(problem, r) for r in records])
-    variables |= {
-        "position_Nm": (("record", "position"), amplitude[:, None] * np.arange(1, POSITIONS + 1) / POSITIONS),
-        "width_torque_Nm": (("record", "point"), np.stack([o[1] for o in own])),
-        "width_rad": (("kept", "record", "point"), np.stack([o[2] for o in own], axis=1).astype(np.float32), {"unit": "rad"}),
-        "model_error_share": (("indicator", "record"), np.stack([o[3] for o in own], axis=-1)),
-        **_sensitivities(posterior, int(np.argmax(amplitude)), rated),
-    }
-    rates = np.array([loading_rate_nm_per_s(d) for d in problem.records])
-    coords = {
-        "record": [d.blocks.name for d in problem.records],
-        "kept": kept,
-        "indicator": list(CORE),
-        "response": list(RESPONSES),
-        "amplitude_Nm": ("record", amplitude),
-        "loading_rate_Nm_per_s": ("record", rates),
-    }
-    return xarray.Dataset(variables, coords=coords, attrs={"k": k, "rated_torque_nm": rated})
+    posterior: Posterior
+    k: float
+    _known: dict = field(default_factory=dict, repr=False)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Loading rates of the records [N·m/s], (records,)."""
+        return self.posterior.records.rate_nm_per_s
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        """Amplitudes of the records [N·m], (records,)."""
+        return self.posterior.records.amplitude_nm
+
+    @property
+    def rated_torque_nm(self) -> float:
+        """T_r [N·m]."""
+        return self.posterior.rated_torque_nm
+
+    @property
+    def kept(self) -> np.ndarray:
+        """Numbers of the kept draws in the flat list."""
+        chains, draws = self.posterior.shape
+        inner = np.linspace(0, draws - 1, min(KEPT_A_CHAIN, draws)).astype(int)
+        return (np.arange(chains)[:, None] * draws + inner).ravel()
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The user's parameters by name, (draws,) each."""
+        return self._once("parameters", lambda: posterior_parameters(self.posterior))
+
+    def loops(self, rate: float, amplitude: float, kept: bool = False) -> Loops:
+        """Settled loops of that rate [N·m/s] and amplitude [N·m], of all or the kept draws."""
+        grid = loop_grid(self.posterior, amplitude, (self.k * self.rated_torque_nm, self.rated_torque_nm))
+        key = ("loops", float(rate), float(amplitude), kept)
+        return self._once(key, lambda: settled_loops(self._some(kept), grid, rate))
+
+    def all(self, rate: float, amplitude: float, kept: bool = False) -> dict[str, np.ndarray]:
+        """Every indicator of UNITS for that loop, (draws,) each; NaN where one is not defined."""
+        key = ("all", float(rate), float(amplitude), kept)
+        return self._once(key, lambda: self._indicators(rate, amplitude, kept))
+
+    def values(self, name: str, rate: float, amplitude: float, kept: bool = False) -> np.ndarray:
+        """One of them."""
+        if name not in CORE:
+            return self.all(rate, amplitude, kept)[name]
+        key, torque = ("core", float(rate), float(amplitude), kept), self.k * self.rated_torque_nm
+        return self._once(key, lambda: core_indicators(self.loops(rate, amplitude, kept), torque))[name]
+
+    def width_torques(self, amplitude: float) -> np.ndarray:
+        """Torques at which a loop's width is told [N·m], dense around zero."""
+        return amplitude * np.linspace(-1, 1, WIDTH_POINTS) ** 3
+
+    def widths(self, rate: float, amplitude: float) -> np.ndarray:
+        """Width of the kept draws' loops at those torques [rad], (kept, points)."""
+        loops = self.loops(rate, amplitude, True)
+        return np.stack([loops.at(loops.width, t) for t in self.width_torques(amplitude)], axis=1)
+
+    def sensitivity(self, response: str, parameter: str) -> np.ndarray:
+        """d ln(response) / d ln(parameter) of the largest loop of the kept draws, without effects."""
+        up, down = (self._moved(parameter, np.exp(0.5 * sign * STEP))[response] for sign in (1, -1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return 2 * (up - down) / (up + down) / STEP
+
+    def _some(self, kept):
+        return self._once("kept", lambda: self.posterior.thinned(KEPT_A_CHAIN)) if kept else self.posterior
+
+    def _once(self, key, make):
+        if key not in self._known:
+            self._known[key] = make()
+        return self._known[key]
+
+    def _indicators(self, rate, amplitude, kept):
+        loops = self.loops(rate, amplitude, kept)
+        areas = {}
+        for module in ("geometric", "friction"):
+            if module in self.posterior.reducer.modules:
+                areas[module] = ind.loop_area_j(settled_loops(self._some(kept), loops.torque_nm, rate, (module,)))
+        return indicators_of(loops, areas, self.k * self.rated_torque_nm, self.rated_torque_nm)
+
+    def _moved(self, parameter, factor):
+        key = ("moved", parameter, float(factor))
+        return self._once(key, lambda: self._moved_indicators(parameter, factor))
+
+    def _moved_indicators(self, parameter, factor):
+        posterior = self._some(True)
+        weights = {n: w * (factor if n in MOVED[parameter] else 1.0) for n, w in posterior.weights.items()}
+        largest = int(np.argmax(self.amplitudes))
+        rate, amplitude = self.rates[largest], self.amplitudes[largest]
+        torque = loop_grid(posterior, amplitude, (self.rated_torque_nm,))
+        wider = [np.log(factor) * (parameter == name) for name in ("friction_torque_Nm", "drag_torque_Nm")]
+        history = settled_history(torque, rate, posterior.context.torque_scale_nm)
+        columns = posterior.reducer.ends(history, tuple(wider), 1.0)
+        flat = replace(posterior, weights=weights).flat
+        parts = {n: cut_loops(torque, flat[n] @ c.T * posterior.context.angle_scale_rad) for n, c in columns.items()}
+        by_module = {m: _sum(parts, posterior.reducer, m) for m in posterior.reducer.modules}
+        areas = {m: ind.loop_area_j(loops) for m, loops in by_module.items() if m != "elastic"}
+        return indicators_of(_sum(parts, posterior.reducer), areas, self.k * self.rated_torque_nm, self.rated_torque_nm)
 
 
-def _of_record(posterior, record, lost_motion_torque, rated, kept):
-    """Indicators of the measured loop, its width for kept draws, and the model error's share in the core ones."""
-    problem, z, weights = posterior.problem, posterior.z, posterior.weights
-    torque = torque_grid(record_amplitude_nm(problem, record), (lost_motion_torque, rated))
-    bare = model_loops(problem, z, record, torque)
-    full = bare
-    if posterior.discrepancy.present:
-        full = bare + discrepancy_loops(problem, posterior.discrepancy, weights, record, torque)
-    named = core_indicators(full, lost_motion_torque)
-    without = core_indicators(bare, lost_motion_torque)
-    share = [_share(named[name], without[name]) for name in CORE]
-    named |= _humps(full) | _mechanism(posterior, record, torque, full)
-    named["theta_L_rad"], named["W_L_J"] = ind.back_drive(full, min(rated, float(torque[-1])))
-    points = torque[-1] * np.linspace(-1, 1, WIDTH_POINTS) ** 3
-    width = np.stack([np.interp(points, torque, w) for w in full.width[kept]])
-    return named, points, width, share
+def _sum(parts, reducer, module=None) -> Loops:
+    own = [loops for name, loops in parts.items() if module in (None, reducer.part(name).module)]
+    return Loops(own[0].torque_nm, sum(x.rising for x in own), sum(x.falling for x in own))
 
 
-def _share(values, without):
-    spread = np.var(values)
-    return float(np.clip(1 - np.var(without) / spread, 0, 1)) if spread > 0 else 0.0
-
-
-def _humps(full):
-    torque, curve = ind.torque_energy(full)
-    tau1, tau2 = ind.hump_torques_nm(torque, curve)
-    return {"tau1_Nm": tau1, "tau2_Nm": tau2, "hump_torque_Nm": torque[np.argmax(curve, axis=1)]}
-
-
-def _mechanism(posterior, record, torque, full):
-    """Areas of geometric error and friction, and the share of the absorbed energy that is given back."""
-    modules = module_loops(posterior.problem, posterior.z, record, torque)
-    area = ind.loop_area_j(full)
-    nothing = np.full(area.shape, np.nan)
-    split = {f"S_{m[0]}_J": ind.loop_area_j(modules[m]) if m in modules else nothing for m in ("geometric", "friction")}
-    split |= {f"S_{x}_over_S": split[f"S_{x}_J"] / area for x in "gf"}
+def indicators_of(loops: Loops, areas: dict, lost_motion_torque_nm: float, rated_nm: float) -> dict[str, np.ndarray]:
+    """Every indicator of UNITS of loops, with the areas of the modules alone; NaN where one is not defined."""
+    found = core_indicators(loops, lost_motion_torque_nm)
+    torque, curve = ind.torque_energy(loops)
+    found["tau1_Nm"], found["tau2_Nm"] = ind.hump_torques_nm(torque, curve)
+    found["hump_torque_Nm"] = torque[np.argmax(curve, axis=1)]
+    area, nothing = found["loop_area_J"], np.full(len(loops.rising), np.nan)
+    for letter, module in (("g", "geometric"), ("f", "friction")):
+        found[f"S_{letter}_J"] = areas.get(module, nothing)
+        found[f"S_{letter}_over_S"] = found[f"S_{letter}_J"] / area
     # What a settled loop absorbs and does not dissipate was stored elastically and is given back.
-    split["elastic_share"] = 1 - area / ind.absorbed_j(full)
-    return split
+    found["elastic_share"] = 1 - area / found["absorbed_J"]
+    found["theta_L_rad"], found["W_L_J"] = ind.back_drive(loops, min(rated_nm, float(loops.torque_nm[-1])))
+    return found
 
 
-def _smaller(posterior, record, lost_motion_torque, kept):
-    """Core indicators (kept, positions) of loops of smaller amplitude: the model's, with the model error scaled down."""
-    other = OtherLoops(posterior, record, kept)
-    found: dict[str, list] = {name: [] for name in CORE}
-    for t in other.amplitude_nm * np.arange(1, POSITIONS + 1) / POSITIONS:
-        for name, values in core_indicators(other.of(t, (lost_motion_torque,)), lost_motion_torque).items():
-            found[name].append(values)
-    return {name: np.stack(values, axis=1) for name, values in found.items()}
-
-
-def _sensitivities(posterior, record, rated):
-    """d ln(response) / d ln(parameter) of the model's loop, for the shared parameters; the largest loop's."""
-    problem = posterior.problem
-    shared = [i for i, c in enumerate(problem.coordinates) if c.record is None]
-    sensed = np.linspace(0, len(posterior.z) - 1, min(SENSITIVITY_DRAWS, len(posterior.z))).astype(int)
-    torque = torque_grid(record_amplitude_nm(problem, record), (rated,))
-    physical = problem.physical(posterior.z[sensed])
-    logs = np.stack([_log_responses(problem, physical, i, record, torque, rated) for i in shared], axis=-1)
+def core_indicators(loops: Loops, lost_motion_torque_nm: float) -> dict[str, np.ndarray]:
+    """The six indicators of the contract by name, each of shape (draws,)."""
     return {
-        "sensitivity": (("sensed", "response", "parameter"), logs.astype(np.float32), {"unit": "1"}),
-        "sensed": (("sensed",), sensed),
-        "parameter": (("parameter",), [problem.coordinates[i].parameter.name for i in shared]),
+        "lost_motion_rad": ind.lost_motion_rad(loops, lost_motion_torque_nm),
+        "zero_torque_width_rad": ind.zero_torque_width_rad(loops),
+        "peak_angle_rad": ind.peak_angle_rad(loops),
+        "loop_area_J": ind.loop_area_j(loops),
+        "absorbed_J": ind.absorbed_j(loops),
+        "dissipation_ratio": ind.dissipation_ratio(loops),
     }
-
-
-def _log_responses(problem, physical, i, record, torque, rated):
-    """Central difference of the log responses by the log of one parameter, shape (draws, responses)."""
-    ends = []
-    for sign in (1, -1):
-        moved = physical.copy()
-        moved[:, i] *= np.exp(0.5 * sign * STEP)
-        at = _Moved(problem, moved)
-        loops = model_loops(at, moved, record, torque)
-        modules = module_loops(at, moved, record, torque)
-        theta, energy = ind.back_drive(loops, min(rated, float(torque[-1])))
-        areas = [ind.loop_area_j(modules[m]) if m in modules else np.full(len(moved), np.nan) for m in ("geometric", "friction")]
-        ends.append(np.stack([theta, energy, ind.loop_area_j(loops), *areas], axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (np.log(ends[0]) - np.log(ends[1])) / STEP
-
-
-class _Moved:
-    """A problem whose coordinates are already physical values."""
-
-    def __init__(self, problem, physical):
-        self.problem, self.model = problem, problem.model
-
-    def values(self, physical, record):
-        """Parameters of one record by name, as ``Problem.values`` gives them."""
-        return self.problem._named(physical, record)
-
-    def __getattr__(self, name):
-        return getattr(self.problem, name)

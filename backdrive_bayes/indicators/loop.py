@@ -1,4 +1,4 @@
-"""Settled loops of posterior draws: model, discrepancy and module parts on a torque grid."""
+"""Settled loops of posterior draws, whole and by module, of any amplitude and rate."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.inference.discrepancy import Discrepancy, amplitude_nm, settled_path
-from backdrive_bayes.inference.problem import Problem
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.mechanics.history import History, through
 
 POINTS = 161
-CHUNK = 500
+RUN_IN_POINTS = 12
+"""Points a leg of the cycle that settles the loop: the class needs turning points only, creep some shape in between."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +32,6 @@ class Loops:
         """The same loops with torque and angle of the other sign."""
         return Loops(-self.torque_nm[::-1], -self.falling[:, ::-1], -self.rising[:, ::-1])
 
-    def __add__(self, other: Loops) -> Loops:
-        return Loops(self.torque_nm, self.rising + other.rising, self.falling + other.falling)
-
     def at(self, curve: np.ndarray, torque_nm: float) -> np.ndarray:
         """A curve (draws, points) over these torques at one of them, shape (draws,); linear between points."""
         index = int(np.clip(np.searchsorted(self.torque_nm, torque_nm), 1, self.torque_nm.size - 1))
@@ -50,6 +48,17 @@ class Loops:
     def _cut_to(self, curve, inside, torque_nm):
         return np.column_stack([self.at(curve, -torque_nm), curve[:, inside], self.at(curve, torque_nm)])
 
+    def late(self, torque_nm: float) -> Loops:
+        """The same loops read by an angle channel that is late by ``torque_nm`` of the torque."""
+        earlier = [np.interp(self.torque_nm - s * torque_nm, self.torque_nm, np.arange(self.torque_nm.size)) for s in (1, -1)]
+        return Loops(self.torque_nm, *(_between(c, at) for c, at in zip((self.rising, self.falling), earlier, strict=True)))
+
+
+def _between(curves, at):
+    """Curves (draws, points) at fractional indices ``at`` (points,)."""
+    low = np.minimum(at.astype(int), curves.shape[1] - 2)
+    return curves[:, low] + (at - low) * (curves[:, low + 1] - curves[:, low])
+
 
 def torque_grid(amplitude: float, exact=()) -> np.ndarray:
     """Odd-symmetric torques from -T to +T, dense around zero, that hold zero and ±``exact`` [N·m]."""
@@ -61,40 +70,33 @@ def torque_grid(amplitude: float, exact=()) -> np.ndarray:
     return np.concatenate([-half[:0:-1], half])
 
 
-def model_loops(problem: Problem, z, record: int, torque, rate_nm_per_s: float | None = None) -> Loops:
-    """The reducer's settled loops on ``torque`` (points,) for draws ``z`` (draws, dimension), by default at the record's rate."""
-    path, reducer = settled_path(torque, rate_nm_per_s or problem.loading_rate_nm_per_s(record)), problem.model.reducer
-    return _cut(torque, _in_chunks(lambda v: reducer.angle(v, path), problem, z, record))
+def loop_grid(posterior: Posterior, amplitude_nm: float, exact=()) -> np.ndarray:
+    """A torque grid that also holds the knots of the clearance, between which settled loops are nearly straight."""
+    return torque_grid(amplitude_nm, (*posterior.reducer.knots * posterior.context.torque_scale_nm, *exact))
 
 
-def module_loops(problem: Problem, z, record: int, torque) -> dict[str, Loops]:
-    """The loops of each module alone, by its name; they add up to :func:`model_loops`."""
-    path, reducer = settled_path(torque, problem.loading_rate_nm_per_s(record)), problem.model.reducer
-    pieces: dict[str, list] = {}
-    for a in range(0, len(z), CHUNK):
-        for name, angle in reducer.parts(problem.values(z[a : a + CHUNK], record), path).items():
-            pieces.setdefault(name, []).append(np.broadcast_to(angle, (len(z[a : a + CHUNK]), path.torque_nm.size)))
-    return {name: _cut(torque, np.concatenate(angle)) for name, angle in pieces.items()}
+def settled_history(torque, rate_nm_per_s: float, torque_scale_nm: float) -> History:
+    """From rest through one cycle of the amplitude of ``torque`` (points,), then down and up along it at that rate."""
+    top = torque[-1]
+    run_in = top * np.r_[0.0, np.linspace(0, 1, RUN_IN_POINTS)[1:], np.linspace(1, -1, 2 * RUN_IN_POINTS)[1:]]
+    whole = np.r_[run_in, np.linspace(-top, top, 2 * RUN_IN_POINTS)[1:], torque[::-1][1:], torque[1:]]
+    time = np.r_[0.0, np.cumsum(np.abs(np.diff(whole)))] / rate_nm_per_s
+    return through(time, whole, torque_scale_nm)
 
 
-def discrepancy_loops(problem: Problem, discrepancy: Discrepancy, weights, record: int, torque) -> Loops:
-    """The discrepancy on the record's own loops for coefficients ``weights`` (draws, terms)."""
-    path = settled_path(torque, problem.loading_rate_nm_per_s(record))
-    basis = discrepancy.basis_on(problem, record, path, model=problem.model.reducer)
-    return _cut(torque, weights @ basis.T)
+def settled_loops(posterior: Posterior, torque, rate_nm_per_s: float, modules=None) -> Loops:
+    """The reducer's settled loops on ``torque`` (points,), odd-symmetric and rising; of some ``modules`` alone where given."""
+    angle = posterior.angles(settled_history(torque, rate_nm_per_s, posterior.context.torque_scale_nm), rate_nm_per_s, modules)
+    return cut_loops(torque, angle)
 
 
-def record_amplitude_nm(problem: Problem, record: int) -> float:
-    """Amplitude T of a record [N·m]."""
-    return amplitude_nm(problem, record)
-
-
-def _in_chunks(function, problem, z, record):
-    return np.concatenate([function(problem.values(z[a : a + CHUNK], record)) for a in range(0, len(z), CHUNK)])
-
-
-def _cut(torque, angle):
-    """Loops out of angles along ``settled_path``: …, +T → −T → +T with both tips in the falling branch."""
+def cut_loops(torque, angle) -> Loops:
+    """Loops out of angles (draws, segments) along :func:`settled_history`."""
     n = torque.size
     loop = angle[..., -(2 * n - 1) :]
     return Loops(torque, loop[..., n - 1 :], loop[..., :n][..., ::-1])
+
+
+def module_loops(posterior: Posterior, torque, rate_nm_per_s: float) -> dict[str, Loops]:
+    """The loops of each module alone by its name; the whole loop is their sum and what effects add."""
+    return {m: settled_loops(posterior, torque, rate_nm_per_s, (m,)) for m in posterior.reducer.modules}

@@ -4,202 +4,119 @@ from __future__ import annotations
 
 import numpy as np
 
+from backdrive_bayes.engine.parameters import PARAMETERS, implied_prior
 from backdrive_bayes.indicators import indicators as ind
+from backdrive_bayes.indicators.convergence import convergence_json
+from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
 from backdrive_bayes.indicators.intervals import LEVEL, interval, over_positions
-from backdrive_bayes.indicators.loop import (
-    Loops,
-    discrepancy_loops,
-    model_loops,
-    module_loops,
-    record_amplitude_nm,
-    torque_grid,
-)
-from backdrive_bayes.indicators.other_loops import OtherLoops, some_draws
-from backdrive_bayes.inference.discrepancy import Discrepancy
-from backdrive_bayes.inference.fit import Posterior
-from backdrive_bayes.inference.problem import Problem
+from backdrive_bayes.indicators.loop import module_loops
 from backdrive_bayes.results import INDICATORS
 
 POSITIONS = 10
-POSITION_DRAWS = 500
 
 
-def core_indicators(loops: Loops, lost_motion_torque_nm: float) -> dict[str, np.ndarray]:
-    """The six indicators of the contract by name, each of shape (draws,)."""
-    return {
-        "lost_motion_rad": ind.lost_motion_rad(loops, lost_motion_torque_nm),
-        "zero_torque_width_rad": ind.zero_torque_width_rad(loops),
-        "peak_angle_rad": ind.peak_angle_rad(loops),
-        "loop_area_J": ind.loop_area_j(loops),
-        "absorbed_J": ind.absorbed_j(loops),
-        "dissipation_ratio": ind.dissipation_ratio(loops),
-    }
-
-
-def monitored(k: float):
-    """The quantities that must converge beside the parameters, as ``fit`` wants them."""
-
-    def quantities(problem: Problem, discrepancy: Discrepancy, z, weights):
-        named = {}
-        for r, data in enumerate(problem.records):
-            loops = reducer_loops(problem, discrepancy, z, weights, r, k)
-            for name, value in core_indicators(loops, k * _rated(problem)).items():
-                named[f"{name} of {data.blocks.name}"] = value
-        return named
-
-    return quantities
-
-
-def reducer_loops(problem, discrepancy, z, weights, record, k) -> Loops:
-    """The reducer's own settled loops: model plus discrepancy."""
-    torque = torque_grid(record_amplitude_nm(problem, record), (k * _rated(problem),))
-    loops = model_loops(problem, z, record, torque)
-    if not discrepancy.present:
-        return loops
-    return loops + discrepancy_loops(problem, discrepancy, weights, record, torque)
-
-
-def _rated(problem):
-    return problem.model.scale.torque_nm
-
-
-def indicators_json(posterior: Posterior, k: float, level: float = LEVEL) -> dict:
-    """The contract's indicators object (least-squares comparison left to the caller)."""
-    problem = posterior.problem
+def indicators_json(draws: IndicatorDraws, level: float = LEVEL) -> dict:
+    """The contract's indicators object (least-squares comparison and provenance left to the caller)."""
+    posterior = draws.posterior
     return {
         "schema": INDICATORS,
-        "unit": posterior.unit.name,
-        "k": k,
+        "unit": posterior.unit_name,
+        "k": draws.k,
         "level": level,
-        "model": {"modules": list(problem.model.names), "effects": []},
-        "convergence": posterior.convergence.to_json(),
-        "model_error": _model_error_json(posterior),
-        "parameters": _parameters_json(posterior, level),
-        "records": [_record_json(posterior, r, k, level) for r in range(len(problem.records))],
+        "rated_torque_Nm": posterior.rated_torque_nm,
+        "model": {"modules": list(posterior.reducer.modules), "effects": list(posterior.hypothesis or ())},
+        "convergence": convergence_json(posterior),
+        "jitter": {"torque_Nm": posterior.jitter[0], "length_Nm": posterior.jitter[1]},
+        "parameters": _parameters_json(draws, level),
+        "records": [_record_json(draws, r, level) for r in range(posterior.records.count)],
     }
 
 
-def _model_error_json(posterior):
-    d = posterior.discrepancy
-    return {
-        "scale_rad": d.scale_rad,
-        "length_loops": d.length,
-        "log_evidence_gain": d.gain,
-        "note": "Indicators are of model plus discrepancy; model_error_share: part of an interval's squared width due to it.",
-    }
-
-
-def _parameters_json(posterior, level):
-    physical = posterior.problem.physical(posterior.z)
-    out = {}
-    for i, (label, c) in enumerate(zip(posterior.problem.labels, posterior.problem.coordinates, strict=True)):
-        prior = c.parameter.scaled_prior(posterior.problem.model.scale)
-        out[label] = interval(physical[:, i], level) | {"unit": c.parameter.unit, "prior": prior.describe()}
+def _parameters_json(draws, level):
+    prior, out = implied_prior(draws.posterior), {}
+    for parameter in PARAMETERS:
+        if parameter.name in draws.parameters:
+            own = {"unit": parameter.unit, "definition": parameter.definition, "null": parameter.null}
+            implied = {"prior": "implied by the class", "prior_interval": interval(prior[parameter.name], level)}
+            out[parameter.name] = interval(draws.parameters[parameter.name], level) | own | implied
     return out
 
 
-def _record_json(posterior, record, k, level):
-    problem, z, weights = posterior.problem, posterior.z, posterior.weights
-    data = problem.records[record]
-    torque = torque_grid(record_amplitude_nm(problem, record), (k * _rated(problem), _rated(problem)))
-    bare = model_loops(problem, z, record, torque)
-    full = bare
-    if posterior.discrepancy.present:
-        full = bare + discrepancy_loops(problem, posterior.discrepancy, weights, record, torque)
-    energy_torque, energy = ind.torque_energy(full)
-    tau1, tau2 = ind.hump_torques_nm(energy_torque, energy)
-    lo, median, hi = np.quantile(energy, [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
+def _record_json(draws, record, level):
+    records, rate, amplitude = draws.posterior.records, draws.rates[record], draws.amplitudes[record]
+    loops, found = draws.loops(rate, amplitude), draws.all(rate, amplitude)
     return {
-        "file": data.blocks.name,
-        "loading_rate_Nm_per_s": loading_rate_nm_per_s(data),
-        "amplitude_Nm": record_amplitude_nm(problem, record),
-        "indicators": _core_json(bare, full, k * _rated(problem), level),
-        "loop": _loop_json(full, level),
-        **_mechanism_json(posterior, record, torque, full, level),
-        "torque_energy": {
-            "torque_Nm": energy_torque.tolist(),
-            "median_J_per_Nm": median.tolist(),
-            "lo": lo.tolist(),
-            "hi": hi.tolist(),
-            "tau1_Nm": interval(tau1, level),
-            "tau2_Nm": interval(tau2, level),
+        "file": records.names[record],
+        "loading_rate_Nm_per_s": float(rate),
+        "amplitude_Nm": float(amplitude),
+        "indicators": {name: interval(found[name], level) for name in CORE},
+        "loop": _loop_json(loops, level),
+        "mechanism": {n: interval(found[n], level) for n in ("S_g_J", "S_g_over_S", "S_f_J", "S_f_over_S") if _known(found[n])},
+        "modules": _modules_json(draws.posterior, loops.torque_nm, rate),
+        "torque_energy": _torque_energy_json(loops, found, level),
+        "by_amplitude": _by_amplitude_json(draws, rate, amplitude, level),
+        "windowed": _windowed_json(loops, level),
+        "back_drive": {
+            "load_Nm": min(draws.rated_torque_nm, float(amplitude)),
+            **{name: interval(found[name], level) for name in ("theta_L_rad", "W_L_J")},
         },
-        "by_amplitude": _by_amplitude_json(posterior, record, level),
-        "windowed": _windowed_json(full, level),
-        "back_drive": _back_drive_json(full, _rated(problem), level),
-        "noise": _noise_json(data.noise),
+        "noise": _noise_json(records.noise[record]),
     }
 
 
-def loading_rate_nm_per_s(data) -> float:
-    """Median |dτ/dt| of a reduced record [N·m/s]."""
-    same = np.diff(data.blocks.leg) == 0
-    return float(np.median(np.abs(np.diff(data.blocks.torque_nm) / np.diff(data.blocks.mid_s))[same]))
+def _known(values) -> bool:
+    return not np.isnan(values).all()
 
 
-def _core_json(bare, full, lost_motion_torque, level):
-    with_error, without = core_indicators(full, lost_motion_torque), core_indicators(bare, lost_motion_torque)
-    out = {}
-    for name, values in with_error.items():
-        entry = interval(values, level)
-        if entry is not None:
-            spread = np.var(values)
-            entry["model_error_share"] = float(np.clip(1 - np.var(without[name]) / spread, 0, 1)) if spread > 0 else 0.0
-        out[name] = entry
-    return out
-
-
-def _loop_json(full, level):
+def _loop_json(loops, level):
     # Where on its scale the encoder reads the loop is no property of the reducer: bands are those of the loop's shape.
-    middle = 0.5 * (full.rising.mean(axis=1) + full.falling.mean(axis=1))
+    middle = 0.5 * (loops.rising.mean(axis=1) + loops.falling.mean(axis=1))
     shift, bands = np.median(middle) - middle[:, None], {}
     for branch in ("rising", "falling"):
-        lo, median, hi = np.quantile(getattr(full, branch) + shift, [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
+        lo, median, hi = np.quantile(getattr(loops, branch) + shift, [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
         bands[f"{branch}_rad"] = {"median": median.tolist(), "lo": lo.tolist(), "hi": hi.tolist()}
-    return {"torque_Nm": full.torque_nm.tolist(), **bands}
+    return {"torque_Nm": loops.torque_nm.tolist(), **bands}
 
 
-def _mechanism_json(posterior, record, torque, full, level):
-    """S_g and S_f, the areas that the geometric and friction modules enclose (the rest is the discrepancy's), and their loops."""
-    modules = module_loops(posterior.problem, posterior.z, record, torque)
-    area, split, curves = ind.loop_area_j(full), {}, {}
-    for name, loops in modules.items():
-        curves[name] = {
-            "rising_rad": np.median(loops.rising, axis=0).tolist(),
-            "falling_rad": np.median(loops.falling, axis=0).tolist(),
-        }
-    for name, key in (("geometric", "S_g"), ("friction", "S_f")):
-        if name in modules:
-            own = ind.loop_area_j(modules[name])
-            split[f"{key}_J"], split[f"{key}_over_S"] = interval(own, level), interval(own / area, level)
-    return {"mechanism": split, "modules": curves}
+def _modules_json(posterior, torque, rate):
+    """Median curves of each module's own loop."""
+    return {
+        name: {f"{branch}_rad": np.median(getattr(loops, branch), axis=0).tolist() for branch in ("rising", "falling")}
+        for name, loops in module_loops(posterior, torque, rate).items()
+    }
 
 
-def _by_amplitude_json(posterior, record, level):
-    """S(t) and u(t) of loops of amplitude t, model predictions with the discrepancy's prior spread, and their extremes."""
-    other = OtherLoops(posterior, record, some_draws(posterior, POSITION_DRAWS))
-    amplitudes = _positions(other.amplitude_nm)
-    loops = [other.of(t) for t in amplitudes]
-    values = (np.stack([f(x) for x in loops]) for f in (ind.loop_area_j, ind.dissipation_ratio))
+def _torque_energy_json(loops, found, level):
+    torque, energy = ind.torque_energy(loops)
+    lo, median, hi = np.quantile(energy, [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
+    return {
+        "torque_Nm": torque.tolist(),
+        "median_J_per_Nm": median.tolist(),
+        "lo": lo.tolist(),
+        "hi": hi.tolist(),
+        "tau1_Nm": interval(found["tau1_Nm"], level),
+        "tau2_Nm": interval(found["tau2_Nm"], level),
+    }
+
+
+def _by_amplitude_json(draws, rate, amplitude, level):
+    """S(t) and u(t) of loops of amplitude t, and their extremes."""
+    amplitudes = _positions(amplitude)
+    found = [draws.loops(rate, t, True) for t in amplitudes]
+    values = (np.stack([f(x) for x in found]) for f in (ind.loop_area_j, ind.dissipation_ratio))
     return {"amplitude_Nm": amplitudes.tolist(), **over_positions(*values, level)}
 
 
-def _windowed_json(full, level):
+def _windowed_json(loops, level):
     """The same of windows |τ| ≤ t cut out of the measured loop; this u(t) may exceed 1, for a window is no closed loop."""
-    torque = _positions(full.torque_nm[-1])
-    windows = [full.within(t) for t in torque]
+    torque = _positions(loops.torque_nm[-1])
+    windows = [loops.within(t) for t in torque]
     values = (np.stack([f(x) for x in windows]) for f in (ind.loop_area_j, ind.dissipation_ratio))
     return {"torque_Nm": torque.tolist(), **over_positions(*values, level)}
 
 
 def _positions(amplitude):
     return amplitude * np.arange(1, POSITIONS + 1) / POSITIONS
-
-
-def _back_drive_json(full, rated, level):
-    load = min(rated, float(full.torque_nm[-1]))
-    angle, energy = ind.back_drive(full, load)
-    return {"load_Nm": load, "theta_L_rad": interval(angle, level), "W_L_J": interval(energy, level)}
 
 
 def _noise_json(noise):

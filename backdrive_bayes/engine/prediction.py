@@ -1,0 +1,80 @@
+"""Angle for any torque history, from a posterior."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.engine.predictive import block_offsets
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.reducer import TOP
+
+MOST_NODES = 20_000
+"""Samples at which the class is evaluated; between them, on one monotone run, curves are straight."""
+PRELOADS = np.array([0.0, 1.0, -1.0, 1 / 3, -1 / 3, 2 / 3, -2 / 3])
+"""Torques, in the largest measured one, from which a reducer of unknown history may have come, equally probable."""
+SLACK = 0.02
+"""Share by which a torque may pass the largest measured one without being beyond it."""
+
+
+def predict_angles(posterior: Posterior, time_s, torque_nm, start: str = "unknown", draws: int = 400) -> np.ndarray:
+    """Curves of the angle [rad] at :func:`nodes` of a torque history, shape (about ``draws``, nodes).
+
+    Each curve is one draw with one record's encoder offset and one initial state (``start`` "rest": neutral at the first torque,
+    "unknown": unloaded from one of PRELOADS), so that the points of a curve belong together.
+    """
+    at = nodes(torque_nm)
+    time, torque = np.asarray(time_s, float)[at], np.asarray(torque_nm, float)[at]
+    span = time[-1] - time[0]
+    rate = float(np.abs(np.diff(torque)).sum() / span)
+    rate = rate if rate > 0 else float(posterior.records.rate_nm_per_s[0])
+    some = posterior.thinned(-(-draws // posterior.shape[0]))
+    preloads = PRELOADS if start == "unknown" else np.array([np.nan])
+    offsets = np.array(block_offsets(posterior))
+    curves = []
+    for i, preload in enumerate(preloads):
+        part = _part(some, i, len(preloads))
+        if part.shape[1]:
+            angle = _from(part, time, torque, rate, preload * posterior.context.torque_scale_nm)
+            curves.append(angle + np.resize(np.roll(offsets, i), len(angle))[:, None])
+    return np.concatenate(curves)
+
+
+def nodes(torque_nm) -> np.ndarray:
+    """Numbers of the samples where a history is evaluated: all of a short one, else turning points and every so manieth."""
+    torque = np.asarray(torque_nm, float)
+    if torque.size <= MOST_NODES:
+        return np.arange(torque.size)
+    moving = np.flatnonzero(np.diff(torque))
+    turns = moving[1:][np.diff(np.sign(np.diff(torque)[moving])) != 0]
+    return np.unique(np.r_[np.linspace(0, torque.size - 1, MOST_NODES).astype(int), turns])
+
+
+def require_range(posterior: Posterior, torque_nm, extrapolate: bool, where) -> None:
+    """BadInput for a history that leaves the measured torques, or with ``extrapolate`` those that the class reaches."""
+    largest, highest = float(np.abs(torque_nm).max()), posterior.context.torque_scale_nm
+    reach = (TOP if extrapolate else 1.0 + SLACK) * highest
+    if not largest <= reach:
+        hint = "" if extrapolate else f" (--extrapolate goes to {TOP * highest:.4g})"
+        raise BadInput(where, f"torques up to {highest:.4g} N·m, the largest measured{hint}", f"{largest:.4g} N·m")
+
+
+def _part(posterior, first, step):
+    return replace(
+        posterior,
+        weights={n: w[:, first::step] for n, w in posterior.weights.items()},
+        log_scale={n: s[:, first::step] for n, s in posterior.log_scale.items()},
+        log_density=posterior.log_density[:, first::step],
+    )
+
+
+def _from(posterior, time, torque, rate, preload_nm):
+    """Angles (draws, nodes) from the neutral state, or after ``preload_nm`` unless that is NaN."""
+    before = torque[:1] if np.isnan(preload_nm) else np.array([0.0, preload_nm, torque[0]])
+    ramp = np.abs(np.diff(before)) / rate
+    early = time[0] - np.r_[np.cumsum(ramp[::-1])[::-1], 0.0]
+    history = through(np.r_[early, time], np.r_[before, torque], posterior.context.torque_scale_nm)
+    return posterior.angles(history, rate)[:, -torque.size :]

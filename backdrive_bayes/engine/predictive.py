@@ -1,0 +1,68 @@
+"""Replicated data: what the bench might have read, from a posterior alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.engine.reduced import Jitter, Reduced
+from backdrive_bayes.mechanics.effect import PathEffect
+from backdrive_bayes.mechanics.history import of_blocks
+
+REPLICATES_A_CHAIN = 50
+
+
+def covariances_rad2(posterior: Posterior) -> list[np.ndarray]:
+    """Covariance of each record's block means about the mode [rad²], (blocks, blocks) each."""
+    scale, angle = posterior.context.torque_scale_nm, posterior.context.angle_scale_rad
+    reduced = Reduced(None, posterior.records.blocks, posterior.records.noise)
+    jitter = Jitter(posterior.jitter[0] / scale, max(posterior.jitter[1] / scale, 1e-12))
+    slopes = reduced.slopes([p / angle for p in posterior.predicted_rad])
+    return [c * reduced.angle_scale_rad**2 for c in reduced.covariances(slopes, jitter)]
+
+
+def block_offsets(posterior: Posterior) -> list[float]:
+    """The encoder's offset of each record [rad]: what is left between reading and prediction in the mean, by generalised
+    least squares.
+    """
+    found = []
+    for blocks, predicted, covariance in zip(
+        posterior.records.blocks, posterior.predicted_rad, covariances_rad2(posterior), strict=True
+    ):
+        weight = np.linalg.solve(covariance, np.ones(blocks.count.size))
+        found.append(float(weight @ (blocks.angle_rad - predicted) / weight.sum()))
+    return found
+
+
+def replicates(posterior: Posterior) -> np.ndarray:
+    """Replicated block means [rad], float32 (chains, draws, blocks): the mode, each draw's departure and new noise."""
+    some = posterior.thinned(REPLICATES_A_CHAIN)
+    rng = np.random.default_rng([posterior.seed, 6])
+    out = []
+    for r, (covariance, offset) in enumerate(zip(covariances_rad2(posterior), block_offsets(posterior), strict=True)):
+        noise = rng.standard_normal((*some.shape, covariance.shape[0])) @ np.linalg.cholesky(covariance).T
+        out.append(posterior.predicted_rad[r] + offset + _departures(some, r).reshape(noise.shape) + noise)
+    return np.concatenate(out, axis=-1).astype(np.float32)
+
+
+def _departures(posterior: Posterior, record: int) -> np.ndarray:
+    """Prediction of each draw less the draws' mean [rad], (draws, blocks); of the reducer and of the record's own columns."""
+    context, distortion = posterior.context, posterior.distortion
+    blocks, own = posterior.records.blocks[record], posterior.records
+    history = of_blocks(blocks, context.torque_scale_nm, distortion.offset, distortion.lag_s)
+    shared = (history, distortion.exponents, context.log_rate[record])
+    columns = posterior.reducer.columns(*shared)
+    mean = posterior.flat["clearance"].mean(axis=0) if "clearance" in posterior.flat else None
+    columns |= posterior.reducer.initial_columns(history, mean, *shared[1:])
+    for effect in posterior.effects:
+        if isinstance(effect, PathEffect) and effect.name in posterior.flat:
+            columns[effect.name] = history.mean(*effect.responses(history, record, context))
+    per_record = {"initial", "floating", *(e.name for e in posterior.effects if e.per_record)}
+    found = 0.0
+    for name, column in columns.items():
+        weights = posterior.flat.get(name, np.zeros((1, 0)))
+        if name in per_record and weights.shape[1] == column.shape[1] * own.count:
+            weights = np.split(weights, own.count, axis=1)[record]
+        if weights.shape[1] == column.shape[1]:
+            found = found + (weights - weights.mean(axis=0)) @ column.T
+    return found * context.angle_scale_rad

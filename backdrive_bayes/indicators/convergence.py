@@ -1,0 +1,71 @@
+"""Whether the indicators themselves have converged, and whether they hold what was measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from backdrive_bayes.engine.diagnostics import diagnose_draws
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
+from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad, zero_torque_width_rad
+from backdrive_bayes.records.measured_loop import MeasuredLoop, measured_loops
+from backdrive_bayes.records.record import Unit
+
+STANDARD_ERRORS = 3.0
+SHARE = {"settled": 0.05, "first": 0.3}
+"""Share of a measured value by which the interval is widened; a cycle from rest is not the settled loop."""
+CHECKED = (
+    ("loop_area_j", "loop area S", "J", loop_area_j),
+    ("half_peak_to_peak_rad", "peak angle", "rad", peak_angle_rad),
+    ("zero_torque_width_rad", "width at zero torque w(0)", "rad", zero_torque_width_rad),
+)
+
+
+def examined(draws: IndicatorDraws, unit: Unit | None = None, level: float = 0.9) -> Posterior:
+    """The posterior with the indicators' diagnostics beside its own, and what the measured cycles of ``unit`` say against it."""
+    posterior = draws.posterior
+    names, columns = [], []
+    for record in range(posterior.records.count):
+        found = draws.all(draws.rates[record], draws.amplitudes[record])
+        names += [f"{name} of {posterior.records.names[record]}" for name in CORE]
+        columns += [found[name].reshape(posterior.shape) for name in CORE]
+    values = np.stack(columns, axis=-1)
+    order = np.broadcast_to(np.arange(values.shape[1]), values.shape[:2])
+    own = diagnose_draws(names, values, order, posterior.convergence.evaluations)
+    doubts = () if unit is None else tuple(contradictions(draws, measured_loops(unit), level))
+    return replace(posterior, convergence=posterior.convergence.joined(own), doubts=doubts)
+
+
+def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, ...], level: float) -> list[str]:
+    """One sentence for every measured number that the posterior's interval does not hold, with both numbers."""
+    found = []
+    for record, loop in enumerate(measured):
+        if loop is None:
+            continue
+        loops = draws.loops(draws.rates[record], draws.amplitudes[record]).late(_lag_nm(draws, record))
+        for name, text, unit, function in CHECKED:
+            value = getattr(loop, name)
+            if value is None:
+                continue
+            lo, hi = np.quantile(function(loops), [0.5 - level / 2, 0.5 + level / 2])
+            room = STANDARD_ERRORS * getattr(loop, f"{name}_sd") + SHARE[loop.basis] * abs(value)
+            if not lo - room <= value <= hi + room:
+                inferred = f"inferred as {lo:.4g} to {hi:.4g} {unit}"
+                found.append(f"{text} of {loop.record} was measured as {value:.4g} {unit}, {inferred}")
+    return found
+
+
+def _lag_nm(draws, record):
+    """By how much of the torque the angle channel is late in a record: it widens what was measured, not the reducer's loop."""
+    lag = draws.posterior.flat.get("sensor_lag")
+    return float(np.median(lag) if lag is not None else draws.posterior.distortion.lag_s) * draws.rates[record]
+
+
+def convergence_json(posterior: Posterior) -> dict:
+    """The contract's ``convergence`` object; what the measurement says against the posterior is its advice."""
+    found = posterior.convergence.to_json()
+    if posterior.doubts:
+        found |= {"converged": False, "advice": f"contradicts the measurement: {posterior.doubts[0]}"}
+    return found | {"contradictions": list(posterior.doubts)}
