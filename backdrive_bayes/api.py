@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from backdrive_bayes.commands.output import probability_text, write_folder, write_json
-from backdrive_bayes.commands.results import FitOptions, diagnose_unit, draw_figures, fit_unit, is_result, keep_fit
+from backdrive_bayes.commands.results import FitOptions, diagnose_unit, draw_figures, fit_unit, is_result, keep_fit, stamped_by
 from backdrive_bayes.decisions.acceptance import assess
 from backdrive_bayes.decisions.claims import read_claims
 from backdrive_bayes.decisions.comparison import ROPE
@@ -48,7 +48,7 @@ class Fit:
 
     @property
     def converged(self) -> bool:
-        """Whether every parameter and indicator passed the diagnostics."""
+        """Whether every parameter and indicator passed the diagnostics and the measurement does not contradict."""
         return bool(self.indicators["convergence"]["converged"])
 
     def back_drive(self, *loads: float, rate: float | None = None) -> list[dict]:
@@ -160,24 +160,22 @@ class Comparison:
         return out
 
 
-def fit(
-    unit, *, k=0.03, level=0.9, seed: int = 0, budget: float = 120.0, baseline=None, loads=(), load_rate=None, progress=None
-) -> Fit:
-    """Posterior and indicators of a unit (or of the path of one); ``budget`` in seconds, ``progress`` is told where it stands.
+def fit(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, loads=(), load_rate=None, progress=None) -> Fit:
+    """Posterior and indicators of a unit (or of the path of one); ``progress`` is told where it stands.
 
     ``loads`` [N·m], arriving at ``load_rate`` [N·m/s] or at every measured rate, are answered under ``indicators["loads"]``.
     """
     given = {} if baseline is None else {"baseline": tuple(baseline)}
-    options = FitOptions(k=k, level=level, seconds=budget, seed=seed, loads=tuple(loads), load_rate=load_rate, **given)
+    options = FitOptions(k=k, level=level, seed=seed, loads=tuple(loads), load_rate=load_rate, **given)
     unit = unit if isinstance(unit, record.Unit) else Unit.read(unit)
     return Fit(*fit_unit(unit, options, progress or (lambda text: None)))
 
 
-def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, budget: float = 30.0, baseline=None, progress=None) -> Diagnosis:
+def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, progress=None) -> Diagnosis:
     """Where model and measurement part, which effect causes it, and the fit of the model with it, as for :func:`fit`."""
     given = {} if baseline is None else {"baseline": tuple(baseline)}
     unit = unit if isinstance(unit, record.Unit) else Unit.read(unit)
-    options = FitOptions(k=k, level=level, seconds=budget, seed=seed, **given)
+    options = FitOptions(k=k, level=level, seed=seed, **given)
     result, sampled = diagnose_unit(unit, options, progress or (lambda text: None))
     return Diagnosis(result, Fit(*sampled))
 
@@ -190,14 +188,16 @@ def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
     """
     models = list(fitted) if isinstance(fitted, list | tuple) else [fitted]
     limits = limits if isinstance(limits, Limits) else read_limits(limits)
-    return Verdict(assess([_evidence(m) for m in models], limits, probabilities, [_evidence(b) for b in batch]))
+    evidences, others = [_evidence(m) for m in models], [_evidence(b) for b in batch]
+    return Verdict(stamped_by(assess(evidences, limits, probabilities, others), [*evidences, *others]))
 
 
 def compare(*fitted, claims=None, rope: float = ROPE, seed: int = 0) -> Comparison:
     """The comparison of two or more fits (or folders of fits); ``claims`` is a file, or "paper" for the published ones."""
     evidences = [_evidence(f) for f in fitted]
     level = evidences[0].about["level"] if evidences else 0.9
-    return Comparison(compare_evidence(evidences, read_claims(claims) if claims else None, rope, level, seed))
+    result = compare_evidence(evidences, read_claims(claims) if claims else None, rope, level, seed)
+    return Comparison(stamped_by(result, evidences, seed, rope=rope, claims=Path(claims or "").name))
 
 
 def report(*results, out: Path | str, template: Path | str | None = None) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 from backdrive_bayes.commands.door import FORCED, collected, repeat_findings
@@ -14,7 +15,9 @@ from backdrive_bayes.commands.results import (
     fit_unit,
     is_result,
     keep_fit,
+    keep_run,
     ready_unit,
+    stamped_by,
 )
 from backdrive_bayes.errors import BadInput
 
@@ -43,7 +46,7 @@ def run(args) -> int:
     from backdrive_bayes.decisions.evidence import Evidence
     from backdrive_bayes.decisions.limits import read_limits
 
-    options, limits = FitOptions.of(args), read_limits(args.limits)
+    began, options, limits = time.perf_counter(), FitOptions.of(args), read_limits(args.limits)
     if args.out:
         require_out(args.out)
     others, probabilities = _models(args.model)
@@ -55,10 +58,12 @@ def run(args) -> int:
         made, evidence, out = _fit(args, limits, options)
     verdict = assess([evidence, *others], limits, probabilities, batch)
     verdict |= collected([evidence.about])
+    stamped_by(verdict, [evidence, *others, *batch])
     with progress() as note, write_folder(out) as folder:
         if made:
             keep_fit(*made, folder, not args.no_figures, note)
         write_json(folder / "verdict.json", verdict)
+        keep_run(folder, "accept", began)
         if not args.no_figures:
             draw_figures("save_verdict_figures", folder)
     _summarise(verdict, out)
@@ -81,7 +86,7 @@ def _fit(args, limits, options):
     wanted = {limit.k for limit in limits.limits if limit.k is not None}
     if len(wanted) > 1:
         raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))
-    with progress(options.seconds) as note:
+    with progress() as note:
         posterior, result = fit_unit(unit, replace(options, k=wanted.pop()) if wanted else options, note)
     ready.stamp(result)["notes"] += ready.lines
     return (posterior, result), Evidence.of(posterior, result), args.out or default_out(unit.name, "accept")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 from backdrive_bayes.commands.door import FORCED, collected, repeat_findings
@@ -14,7 +15,9 @@ from backdrive_bayes.commands.results import (
     fit_unit,
     is_result,
     keep_fit,
+    keep_run,
     ready_unit,
+    stamped_by,
 )
 from backdrive_bayes.errors import BadInput
 
@@ -37,7 +40,7 @@ def run(args) -> int:
     from backdrive_bayes.decisions.claims import read_claims
     from backdrive_bayes.decisions.comparison import compare
 
-    options = FitOptions.of(args)
+    began, options = time.perf_counter(), FitOptions.of(args)
     if len(args.units) < 2:
         raise BadInput("compare", "two units or more", "one")
     if not 0 < args.rope < 1:
@@ -48,12 +51,14 @@ def run(args) -> int:
     evidences, made = _evidences(args, options)
     result = compare(evidences, claims, args.rope, args.level, args.seed)
     result |= collected([e.about for e in evidences])
+    stamped_by(result, evidences, args.seed, rope=args.rope, claims=Path(args.claims or "").name)
     out = args.out or default_out("-".join(result["names"][:3]), "compare")
     with progress() as note, write_folder(out) as folder:
         for name, (posterior, own) in made.items():
             (folder / name).mkdir()
             keep_fit(posterior, own, folder / name, not args.no_figures, note)
         write_json(folder / "comparison.json", result)
+        keep_run(folder, "compare", began)
         if not args.no_figures:
             draw_figures("save_comparison_figures", folder)
     _summarise(result, out)
@@ -74,7 +79,7 @@ def _evidences(args, options):
             evidences.append(ready)
             continue
         unit = ready.unit
-        with progress(options.seconds) as note:
+        with progress() as note:
             posterior, result = fit_unit(unit, options, lambda text, name=unit.name, note=note: note(f"{name}: {text}"))
         ready.stamp(result)["notes"] += ready.lines
         evidences.append(Evidence.of(posterior, result))
@@ -87,7 +92,7 @@ def _summarise(result: dict, out: Path) -> None:
     if result["forced"]:
         say(FORCED)
     if not result["converged"]:
-        say("INCONCLUSIVE: a unit's sampling has not converged; give it more time (--budget)")
+        say("INCONCLUSIVE: a unit's fit is not to be used")
     for pair in result["pairs"]:
         say(f"{pair['first']} against {pair['second']}: ratio [{result['level']:.0%} interval]")
         for condition in pair["conditions"]:

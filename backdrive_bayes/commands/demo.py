@@ -30,8 +30,8 @@ def run(args) -> int:
     for name in UNITS:
         folder = out / name
         check.run(Namespace(unit=args.data / name, out=folder, seed=args.seed))
-        defaults = {"baseline": BASELINE, "k": 0.03, "level": 0.9, "budget": 300.0, "seed": args.seed, "no_figures": False}
-        codes.append(fit.run(Namespace(unit=args.data / name, out=folder, resume=False, **defaults)))
+        defaults = {"baseline": BASELINE, "k": 0.03, "level": 0.9, "seed": args.seed, "no_figures": False}
+        codes.append(fit.run(Namespace(unit=args.data / name, out=folder, **defaults)))
         limits = args.data / "limits.toml"
         accept.run(Namespace(unit=folder, out=folder, limits=limits, model=[], batch=[], **defaults))
         results.append(folder)

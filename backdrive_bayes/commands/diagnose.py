@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
-from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, diagnose_unit, draw_figures, keep_fit, ready_unit
+from backdrive_bayes.commands.results import (
+    FitOptions,
+    add_fit_arguments,
+    diagnose_unit,
+    draw_figures,
+    keep_fit,
+    keep_run,
+    ready_unit,
+)
 
 HELP = "find the unmodelled effect behind the gap between model and measurement"
 
@@ -15,13 +24,12 @@ def add_arguments(parser) -> None:
     """Options of this verb."""
     parser.add_argument("unit", type=Path, metavar="UNIT", help="unit folder or a bare record file")
     add_fit_arguments(parser)
-    parser.set_defaults(budget=30.0)
     parser.add_argument("--no-posterior", action="store_true", help="write diagnosis.json only, sample nothing")
 
 
 def run(args) -> int:
     """Diagnose and write diagnosis.json, posterior.nc of the chosen model and figures; 0 done, 4 inconclusive."""
-    options = FitOptions.of(args)
+    began, options = time.perf_counter(), FitOptions.of(args)
     ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
     unit = ready.unit
     out = args.out or default_out(unit.name, "diagnose")
@@ -33,6 +41,7 @@ def run(args) -> int:
         ready.stamp(sampled[1])
     with write_folder(out) as folder:
         write_json(folder / "diagnosis.json", result)
+        keep_run(folder, "diagnose", began)
         if sampled is not None:
             keep_fit(*sampled, folder, figures=False)
         if not args.no_figures:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 from backdrive_bayes.commands.output import default_out, require_out, say, write_folder
 from backdrive_bayes.commands.progress import progress
-from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, fit_unit, keep_fit, ready_unit
+from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, fit_unit, keep_fit, keep_run, ready_unit, retire
 
-CHAIN = "chain.h5"
 ARCMIN = 10800.0 / 3.141592653589793
 HELP = "infer a unit's parameters and indicators, with credible intervals"
 
@@ -26,44 +26,40 @@ def add_arguments(parser) -> None:
         help="also say how far this load [N·m] turns the output and what energy is absorbed (repeatable)",
     )
     parser.add_argument("--load-rate", type=float, metavar="NM/S", help="rate at which they arrive (default: every measured one)")
-    parser.add_argument("--resume", action="store_true", help="go on with the fit in OUT whose budget ran out")
 
 
 def run(args) -> int:
-    """Fit and write posterior.nc, indicators.json and figures; 0 done, 4 not converged, then with chain.h5 to resume from."""
-    from backdrive_bayes.inference.chain_file import read_chain, write_chain
-
-    options = FitOptions.of(args)
+    """Fit and write posterior.nc, indicators.json, run.json and figures; 0 done, 4 not to be used."""
+    began, options = time.perf_counter(), FitOptions.of(args)
     ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
     unit = ready.unit
     out = args.out or default_out(unit.name, "fit")
     require_out(out)
-    resume = read_chain(out / CHAIN, unit, options.baseline, options.seed) if args.resume else None
-    with progress(options.seconds) as note:
-        posterior, result = fit_unit(unit, options, note, resume)
+    with progress() as note:
+        posterior, result = fit_unit(unit, options, note)
         ready.stamp(result)["notes"] += ready.lines
         with write_folder(out) as folder:
             keep_fit(posterior, result, folder, not args.no_figures, note)
-            if not posterior.converged:
-                write_chain(posterior, folder / CHAIN)
-    if posterior.converged:
-        (out / CHAIN).unlink(missing_ok=True)
+            keep_run(folder, "fit", began)
+    retire(out, result["data_sha256"])
     _summarise(result, out)
     return 0 if posterior.converged else 4
 
 
 def _summarise(result: dict, out: Path) -> None:
     convergence = result["convergence"]
-    if not convergence["converged"]:
+    if convergence["converged"]:
+        say(f"{result['unit']}: converged; median [{result['level']:.0%} interval]")
+    else:
         least = min(convergence["min_bulk_ess"], convergence["min_tail_ess"])
         say(f"{result['unit']}: INCONCLUSIVE, {convergence['advice']}")
-        say(f"  worst: {convergence['worst']}; R-hat {convergence['max_rhat']:.3f}, ESS {least:.0f}")
-    else:
-        say(f"{result['unit']}: converged in {convergence['seconds']:.1f} s; median [{result['level']:.0%} interval]")
-        for record in result["records"]:
-            say(f"  {record['file']}: " + ", ".join(_shown(record["indicators"], result["k"])))
-        for row in result.get("loads", []):
-            say(f"  {_load_text(row)}")
+        for text in convergence["contradictions"][1:]:
+            say(f"  and {text}")
+        say(f"  R-hat {convergence['max_rhat']:.3f}, ESS {least:.0f} ({convergence['worst']}); provisional median [interval]:")
+    for record in result["records"]:
+        say(f"  {record['file']}: " + ", ".join(_shown(record["indicators"], result["k"])))
+    for row in result.get("loads", []):
+        say(f"  {_load_text(row)}")
     say(f"written to {out}")
 
 

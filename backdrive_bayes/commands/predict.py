@@ -9,7 +9,7 @@ from backdrive_bayes.errors import BadInput
 
 HELP = "angle with 90 % interval for a torque history, from a posterior"
 RAD_TO_ARCMIN = 10800.0 / 3.141592653589793
-MOST_CELLS = 4_000_000
+DRAWS = 400
 
 
 def add_arguments(parser) -> None:
@@ -17,45 +17,49 @@ def add_arguments(parser) -> None:
     parser.add_argument("posterior", type=Path, metavar="POSTERIOR.nc", help="posterior.nc of a fit")
     parser.add_argument("path", type=Path, metavar="PATH.csv", help="torque history with columns time_s and torque_Nm")
     parser.add_argument(
-        "--start", choices=("unknown", "rest"), default="unknown", help="the reducer's past (default unknown)"
+        "--start", choices=("unknown", "rest"), default="unknown", help="the reducer's initial state (default unknown)"
     )
     parser.add_argument("--draws", type=int, default=0, metavar="N", help="also write N whole curves, draws.csv")
+    parser.add_argument("--extrapolate", action="store_true", help="go on to 1.2 times the largest measured torque")
 
 
 def run(args) -> int:
     """Write prediction.csv (and draws.csv)."""
     import numpy as np
 
-    from backdrive_bayes.inference.predict import DRAWS, predict_angles
+    from backdrive_bayes.engine.posterior_read import read_posterior
+    from backdrive_bayes.engine.prediction import nodes, predict_angles, require_range
     from backdrive_bayes.records.history import noise_free_torque, read_history
 
+    posterior = read_posterior(args.posterior)
+    if not posterior.converged:
+        raise BadInput(args.posterior, "a converged posterior", "one that is not to be used (its indicators.json says why)")
     time, measured = read_history(args.path)
     torque, noisy = noise_free_torque(time, measured)
     if noisy:
         say("the torque history is noisy: it was made monotone between its turning points before it drives the model")
-    if not 0 <= args.draws <= MOST_CELLS // time.size:
-        raise BadInput("--draws", f"a number from 0 to {MOST_CELLS // time.size}", args.draws)
-    count = max(args.draws, DRAWS)
-    curves = _curves(predict_angles, args, time, torque, np.random.default_rng(args.seed), count)
-    curves *= RAD_TO_ARCMIN
-    lo, hi = np.quantile(curves, [0.05, 0.95], axis=0)
-    columns = np.column_stack([time, measured, curves.mean(axis=0), lo, hi])
-    header = "time_s,torque_Nm,angle_mean_arcmin,angle_lo90_arcmin,angle_hi90_arcmin"
+    require_range(posterior, torque, args.extrapolate, args.path)
+    if not 0 <= args.draws <= DRAWS:
+        raise BadInput("--draws", f"a number from 0 to {DRAWS}", args.draws)
+    curves = predict_angles(posterior, time, torque, args.start, DRAWS) * RAD_TO_ARCMIN
+    bounds = np.stack([curves.mean(axis=0), *np.quantile(curves, [0.05, 0.95], axis=0)])
     out = args.out or Path(f"{args.path.stem}-predict")
+    header = "time_s,torque_Nm,angle_mean_arcmin,angle_lo90_arcmin,angle_hi90_arcmin"
     with write_folder(out) as folder:
-        np.savetxt(folder / "prediction.csv", columns, delimiter=",", header=header, comments="", fmt="%.9g")
+        _write(folder / "prediction.csv", header, time, measured, nodes(torque), bounds)
         if args.draws:
+            some = curves[np.linspace(0, len(curves) - 1, args.draws).astype(int)]
             names = ",".join(["time_s", "torque_Nm", *(f"angle_{i}_arcmin" for i in range(args.draws))])
-            table = np.column_stack([time, measured, curves[: args.draws].T])
-            np.savetxt(folder / "draws.csv", table, delimiter=",", header=names, comments="", fmt="%.9g")
-    say(f"written to {out}/prediction.csv: {time.size} points, half-width at most {np.max(hi - lo) / 2:.3g}′")
+            _write(folder / "draws.csv", names, time, measured, nodes(torque), some)
+    half = float(np.max(bounds[2] - bounds[1]) / 2)
+    say(f"written to {out}/prediction.csv: {time.size} points, half-width at most {half:.3g}′")
     return 0
 
 
-def _curves(predict_angles, args, time, torque, rng, count):
+def _write(path, header, time, torque, at, curves) -> None:
+    """One row a sample; ``curves`` (columns, nodes) are known at the samples ``at``."""
     import numpy as np
 
-    # Long histories are drawn in as many curves as memory likes; quantiles need some hundred.
-    count = min(count, max(args.draws, 200, 40_000_000 // time.size))
-    return np.asarray(predict_angles(args.posterior, time, torque, rng=rng, start=args.start, draws=count))
-
+    every = np.arange(time.size)
+    columns = np.column_stack([time, torque, *(np.interp(every, at, curve) for curve in curves)])
+    np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt="%.9g")

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass, replace
+import os
+import platform
+import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from backdrive_bayes.commands.door import add_force_argument, ready_unit
@@ -17,23 +21,22 @@ FIT_FILES = ("posterior.nc", "indicators.json")
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How a unit is fitted; ``seconds`` is the budget of sampling, ``loads`` [N·m] and ``load_rate`` [N·m/s] ask for B."""
+    """How a unit is fitted; ``loads`` [N·m] and ``load_rate`` [N·m/s] ask for B."""
 
     baseline: tuple[str, ...] = tuple(BASELINE.split(","))
     k: float = 0.03
     level: float = 0.9
-    seconds: float = 120.0
     seed: int = 0
     loads: tuple[float, ...] = ()
     load_rate: float | None = None
 
     def __post_init__(self):
-        from backdrive_bayes.model.registry import members_named
-
-        members_named(self.baseline, "--baseline")
-        for name, value, top in (("--k", self.k, 1.0), ("--level", self.level, 1.0), ("--budget", self.seconds, 1e7)):
-            if not 0 < value < top:
-                raise BadInput(name, f"a number between 0 and {top:g}", value)
+        known = BASELINE.split(",")
+        if not set(self.baseline) <= set(known) or "elastic" not in self.baseline:
+            raise BadInput("--baseline", f"modules out of {', '.join(known)}, elastic among them", ",".join(self.baseline))
+        for name, value in (("--k", self.k), ("--level", self.level)):
+            if not 0 < value < 1:
+                raise BadInput(name, "a number between 0 and 1", value)
         for load in self.loads:
             if not math.isfinite(load) or load == 0:
                 raise BadInput("--load", "a torque other than zero [N·m]", load)
@@ -46,7 +49,12 @@ class FitOptions:
         """From a parsed command line."""
         loads = tuple(getattr(args, "load", ()))
         baseline = tuple(args.baseline.split(","))
-        return cls(baseline, args.k, args.level, args.budget, args.seed, loads, getattr(args, "load_rate", None))
+        return cls(baseline, args.k, args.level, args.seed, loads, getattr(args, "load_rate", None))
+
+    def to_json(self) -> dict:
+        """As results carry them; the seed stands beside them."""
+        loads = {"loads": list(self.loads), "load_rate": self.load_rate} if self.loads else {}
+        return {"baseline": list(self.baseline), "k": self.k, "level": self.level, **loads}
 
 
 def add_fit_arguments(parser) -> None:
@@ -54,41 +62,55 @@ def add_fit_arguments(parser) -> None:
     parser.add_argument("--baseline", default=BASELINE, help="modules of the model, comma-separated")
     parser.add_argument("--k", type=float, default=0.03, help="share of T_r at which lost motion is taken (default 0.03)")
     parser.add_argument("--level", type=float, default=0.9, help="level of the central intervals (default 0.9)")
-    parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS", help="stop sampling after this time")
     parser.add_argument("--no-figures", action="store_true", help="write no figures")
     add_force_argument(parser)
 
 
-def fit_unit(unit, options: FitOptions, note=lambda text: None, resume=None):
+def fit_unit(unit, options: FitOptions, note=lambda text: None, posterior=None):
     """Posterior of a unit and its indicators object, with the classic fit and the unit's own words.
 
-    ``resume`` is what chain_file.read_chain found of a fit whose budget ran out.
+    ``posterior`` is taken where one was computed already.
     """
+    from backdrive_bayes.engine.averaged import fit_posterior
+    from backdrive_bayes.engine.posterior_file import as_saved
+    from backdrive_bayes.indicators.convergence import examined
+    from backdrive_bayes.indicators.draws import IndicatorDraws
     from backdrive_bayes.indicators.least_squares import least_squares_json
     from backdrive_bayes.indicators.loads import loads_json, require_loads
-    from backdrive_bayes.indicators.summary import indicators_json, monitored
-    from backdrive_bayes.inference.fit import fit
-    from backdrive_bayes.inference.sampling import Settings
+    from backdrive_bayes.indicators.summary import indicators_json
 
-    require_loads(unit, options.loads)
-    posterior = fit(
-        unit,
-        baseline=options.baseline,
-        seed=options.seed,
-        settings=Settings(max_seconds=options.seconds),
-        quantities=monitored(options.k),
-        resume=resume,
-        progress=note,
-    )
+    require_loads(unit.rated_torque_nm, options.loads)
+    posterior = as_saved(posterior or fit_posterior(unit, options.baseline, options.seed, note))
     note("indicators and their intervals")
-    result = indicators_json(posterior, options.k, options.level)
+    posterior = examined(IndicatorDraws(posterior, options.k), unit, options.level)
+    result = indicators_json(IndicatorDraws(posterior, options.k), options.level)
     if options.loads:
         result["loads"] = loads_json(posterior, options.loads, options.load_rate, options.level)
     for record, own in zip(result["records"], unit.records, strict=True):
         record["least_squares"] = least_squares_json(own, unit.rated_torque_nm, options.k)
     result["identity"] = dict(unit.identity)
     result["notes"] = [*unit.notes, *(f"{r.name}: {note}" for r in unit.records for note in r.notes)]
-    return posterior, result
+    return posterior, stamped(result, posterior.data_hashes, options.seed, options.to_json())
+
+
+def stamped(result: dict, data_sha256, seed: int, options: dict) -> dict:
+    """The result with what it rests on: hashes of the data, version, seed and options."""
+    from importlib.metadata import version
+
+    from backdrive_bayes.engine.posterior_file import software
+
+    result["data_sha256"] = list(data_sha256)
+    result["version"], result["versions"] = version("backdrive-bayes"), software()
+    result["seed"], result["options"] = seed, options
+    return result
+
+
+def stamped_by(result: dict, evidences, seed: int | None = None, **options) -> dict:
+    """The same for a result that rests on fits; without a seed of its own it has that of the first."""
+    about = evidences[0].about
+    hashes = [h for e in evidences for h in e.about.get("data_sha256", [])]
+    own = {key: about[key] for key in ("k", "level")} | {"baseline": about["model"]["modules"]}
+    return stamped(result, hashes, about.get("seed", 0) if seed is None else seed, own | options)
 
 
 def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: bool = True):
@@ -96,25 +118,45 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
     from backdrive_bayes.gap.diagnose import diagnose
 
     found = diagnose(unit, baseline=options.baseline, seed=options.seed, k=options.k, progress=note)
+    hashes = tuple(filter(None, [unit.data_hash]))
     if not sample:
-        return found.json, None
-    named = tuple(e for e in found.effects if e not in options.baseline)
-    sampled = fit_unit(unit, replace(options, baseline=(*options.baseline, *named)), note)
-    found.json["convergence"] = sampled[0].convergence.to_json()
-    return found.json, sampled
+        return stamped(found.json, hashes, options.seed, options.to_json()), None
+    sampled = fit_unit(unit, options, note, getattr(found, "posterior", None))
+    found.json["convergence"] = sampled[1]["convergence"]
+    return stamped(found.json, sampled[0].data_hashes, options.seed, options.to_json()), sampled
 
 
 def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=lambda text: None) -> None:
     """Write indicators.json, posterior.nc and figures into ``folder``."""
-    from backdrive_bayes.indicators.draws import indicator_draws
-    from backdrive_bayes.inference.posterior_file import write_posterior
+    from backdrive_bayes.engine.posterior_file import write_posterior
 
-    note("draws of the indicators")
+    note("saving the posterior")
     write_json(folder / "indicators.json", result)
-    write_posterior(posterior, folder / "posterior.nc", {"indicators": indicator_draws(posterior, result["k"])})
+    write_posterior(posterior, folder / "posterior.nc", result.get("options"))
     if figures:
         note("figures")
         draw_figures("save_figures", folder)
+
+
+def keep_run(folder: Path, verb: str, began_s: float) -> None:
+    """Write run.json: how long it took since ``began_s`` of time.perf_counter, and on what machine; no result depends on it."""
+    facts = {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()}
+    seconds = round(time.perf_counter() - began_s, 2)
+    write_json(folder / "run.json", {"schema": "backdrive-bayes/run/1", "verb": verb, "seconds": seconds, "machine": facts})
+
+
+def retire(out: Path, data_sha256) -> None:
+    """Take away what an older fit left in ``out``: its verdict, and a diagnosis of other data."""
+    (out / "verdict.json").unlink(missing_ok=True)
+    path = out / "diagnosis.json"
+    try:
+        found = json.loads(path.read_text(encoding="utf-8")).get("data_sha256")
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError, AttributeError):
+        found = None
+    if found != list(data_sha256):
+        path.unlink()
 
 
 def draw_figures(function: str, folder: Path) -> None:

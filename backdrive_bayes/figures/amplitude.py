@@ -9,7 +9,7 @@ from backdrive_bayes.figures.style import MJ_PER_J, SERIES, few_ticks, new_figur
 
 CAPTION = (
     "Energy S(t) dissipated in a loop of amplitude t and dissipation ratio u(t) = S/W_abs: median and "
-    "interval. Below the measured amplitude these are the model's predictions."
+    "interval. Below the measured amplitude these are predictions."
 )
 PANELS = (("loop_area_J", MJ_PER_J, "S(t) [mJ]"), ("dissipation_ratio", 1.0, "u(t) [–]"))
 

@@ -26,8 +26,8 @@ RATIOS = (
 )
 MECHANISM = (
     "How each unit releases energy. Left: energy that geometric error and friction dissipate, as shares of S; what is "
-    "missing to 1 or goes beyond it is model error; bars end at 1.5. Right: share of the absorbed energy W_abs that was stored "
-    "elastically and is given back. Medians with intervals."
+    "missing to 1 or goes beyond it is due to effects; bars end at 1.5. Right: share of the absorbed energy W_abs that was "
+    "stored elastically and is given back. Medians with intervals."
 )
 SHOWN = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
 MOST_OF_S = 1.5

@@ -1,4 +1,4 @@
-"""The settled loop taken apart: what each module and the model error contribute."""
+"""The settled loop taken apart: what each module and the effects contribute."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from backdrive_bayes.figures.style import (
 )
 
 CAPTION = (
-    "The settled loop as the sum of its modules (median curves) and of the model error, which is the loop "
+    "The settled loop as the sum of its modules (median curves) and of the effects, which are the loop "
     "minus the sum of the modules. Panels share the loop's angle scale unless they say otherwise."
 )
 COLUMNS = 3
@@ -53,7 +53,7 @@ def _alike(a, b):
 
 
 def draw(saved: Saved, records: list[int]):
-    """Panels for the loop, each module and the model error of the first of ``records``, angle [arcmin] over
+    """Panels for the loop, each module and the effects of the first of ``records``, angle [arcmin] over
     torque [N·m].
     """
     record = saved.records[records[0]]
@@ -82,7 +82,7 @@ def _curves(record):
         m: [np.asarray(c[k]) for k in ("rising_rad", "falling_rad")] for m, c in record["modules"].items()
     }
     rest = [whole - sum(parts[i] for parts in modules.values()) for i, whole in enumerate(loop)]
-    return [("settled loop", *loop), *((words(m), *c) for m, c in modules.items()), ("model error", *rest)]
+    return [("settled loop", *loop), *((words(m), *c) for m, c in modules.items()), ("effects", *rest)]
 
 
 def _scales(axes, curves):

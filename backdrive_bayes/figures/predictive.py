@@ -20,10 +20,10 @@ CAPTION = (
     "Posterior predictive check. Left: distribution of the measured blocks' ranks among replicated blocks, "
     "as difference from an even spread; the band holds the same curve of the replicates themselves. Middle "
     "and right: two summaries of the measured record (line) among those of the replicates (histogram); the "
-    "rms step of the residual from block to block tests the noise level. Replicates are wider than the "
-    "measurement: the model error follows the measured record and takes part of its noise along, while each "
-    "replicate has fresh noise and the model error's own uncertainty. Ranks then crowd in the middle (the "
-    "curve falls, then rises) and the line lies left of the histogram: cautious. The opposite means misfit."
+    "rms step of the residual from block to block tests the noise level. Replicates may be wider than the "
+    "measurement: the posterior follows the measured record and takes part of its noise along, while each "
+    "replicate has fresh noise. Ranks then crowd in the middle (the curve falls, then rises) and the line lies "
+    "left of the histogram: cautious. The opposite means model discrepancy."
 )
 POINTS = 101
 

@@ -78,7 +78,7 @@ def record_blocks(saved: Saved, record: int) -> RecordBlocks:
     """The blocks of one record with everything that loops and predictive checks show."""
     constant = saved.group("constant_data")
     own = constant["block_record"].values == record
-    offset = float(saved.group("posterior")["offset"].values[..., record].mean())
+    offset = float(constant["offset_rad"].values[record])
     replicates = saved.group("posterior_predictive")["angle_rad"].values[..., own]
     turning = constant["turning_nm"].values[constant["turning_record"].values == record]
     leg = constant["leg"].values[own]

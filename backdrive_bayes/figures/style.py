@@ -175,8 +175,8 @@ def in_words(text: str) -> str:
 
 
 def words(name: str) -> str:
-    """A parameter's or module's name in words."""
-    return name.replace("_", " ")
+    """A parameter's or module's name in words, without its unit."""
+    return re.sub(r"_(rad_per_Nm|rad|Nm)$", "", name).replace("_", " ")
 
 
 def two_lines(text: str, unit: str) -> str:

@@ -9,7 +9,7 @@ from backdrive_bayes.figures.style import display_unit, indicator_words, words
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.numbers import fixed, interval_text, level_text, like_interval, probability_text, significant
 from backdrive_bayes.report.sentences import sentence
-from backdrive_bayes.report.text import free, short_digest
+from backdrive_bayes.report.text import digests, free
 from backdrive_bayes.results import VERDICT, read_result
 
 ON_SUMMARY = 6
@@ -69,7 +69,7 @@ def _identity(verdict):
         ("All limits kept", f"with probability {probability_text(verdict['conformance_probability'])}"),
         ("Limiting", _limiting(verdict)),
     ]
-    return Facts([*rows, *([("Data, SHA-256", short_digest(fit["data_sha256"]))] if fit.get("data_sha256") else [])])
+    return Facts([*rows, *([("Data, SHA-256", digests(fit["data_sha256"]))] if fit.get("data_sha256") else [])])
 
 
 def _limiting(verdict):
@@ -198,8 +198,8 @@ def _structure(verdict):
     told = (
         "Probabilities of the models that were averaged, with those of effects that a gap diagnosis found and no model holds."
         if weighed
-        else f"One model only: {rows[0][0]}. No gap diagnosis was given, so nothing here tells how probable it is; what it "
-        "cannot follow is carried by its model error, within the intervals."
+        else f"One model only: {rows[0][0]}. No gap diagnosis was given, so nothing here tells how probable it is: "
+        "an effect that acts beside it may hide."
     )
     found = verdict["convergence"]
     sampling = "The sampling converged" if found["converged"] else "The sampling has NOT converged"
@@ -220,8 +220,12 @@ def _model(model):
 
 
 def _reproduction(fit):
-    rows = [(name, str(fit[key])) for name, key in _REPRODUCTION if fit.get(key) is not None]
+    rows = [(name, _text(fit[key])) for name, key in _REPRODUCTION if fit.get(key) is not None]
     return [Heading("Reproduction"), Facts(rows)] if rows else []
+
+
+def _text(value):
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 _REPRODUCTION = (("Seed", "seed"), ("Software", "versions"), ("Data, SHA-256", "data_sha256"))

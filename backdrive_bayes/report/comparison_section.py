@@ -10,7 +10,7 @@ from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note,
 from backdrive_bayes.report.claims_section import claims
 from backdrive_bayes.report.numbers import interval_text, level_text, probability_text
 from backdrive_bayes.report.sentences import sentence
-from backdrive_bayes.report.text import Free, free, short_digest
+from backdrive_bayes.report.text import Free, digests, free
 from backdrive_bayes.results import COMPARISON, read_result
 
 KEY = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
@@ -85,7 +85,7 @@ def _identity(result):
         known = unit.get("identity") or {}
         about = free("; ".join(str(known[k]) for k in ("description", "origin") if known.get(k)), 200)
         digest = fit.get("data_sha256")
-        rows.append((free(name, 24), Free("; ".join(filter(None, [about, digest and f"data SHA-256 {short_digest(digest)}"])))))
+        rows.append((free(name, 24), Free("; ".join(filter(None, [about, digest and f"data SHA-256 {digests(digest)}"])))))
     return Facts(rows)
 
 
@@ -165,7 +165,7 @@ def _mechanism(result):
         for r in m["records"]
     ]
     return [
-        Table(["Unit", "S_g/S [–]", "S_f/S [–]", "model error/S [–]", "given back/W_abs [–]"], rows, [1.1, 1.1, 1.1, 1.1, 1.15]),
+        Table(["Unit", "S_g/S [–]", "S_f/S [–]", "effects/S [–]", "given back/W_abs [–]"], rows, [1.1, 1.1, 1.1, 1.1, 1.15]),
         Note(
             "S_g, S_f: energy that geometric error and friction dissipate in a cycle. Given back: (W_abs − S)/W_abs, stored "
             f"elastically. Medians with {level_text(result['level'])} intervals."
@@ -191,6 +191,6 @@ def _refused(result):
 def _reproduction(result):
     rows = []
     for name, fit in zip(result["names"], result["reproduction"], strict=True):
-        rows.append((free(name, 24), f"seed {fit.get('seed', '–')}; data SHA-256 {fit.get('data_sha256', '–')}"))
+        rows.append((free(name, 24), f"seed {fit.get('seed', '–')}; data SHA-256 {digests(fit.get('data_sha256') or '–')}"))
     versions = sorted({str(f["versions"]) for f in result["reproduction"] if "versions" in f})
     return [Heading("Reproduction"), Facts([*rows, *(("Software", v) for v in versions)])]

@@ -21,7 +21,7 @@ from backdrive_bayes.report.blocks import (
 from backdrive_bayes.report.classic_tables import least_squares
 from backdrive_bayes.report.numbers import fixed, level_text
 from backdrive_bayes.report.parameter_tables import parameters
-from backdrive_bayes.report.text import free, short_digest
+from backdrive_bayes.report.text import digests, free
 
 ON_SUMMARY = 2 * PER_FIGURE
 """Records whose indicators fit on the summary page."""
@@ -60,9 +60,10 @@ def _verdict(saved):
     )
     if found["converged"]:
         return Banner("good", "CONVERGED: the intervals may be used", numbers)
-    advice = (found.get("advice") or "sample longer and report again").rstrip(".")
-    text = f"Do not use these intervals. Advice: {advice}. {numbers}"
-    return Banner("bad", "INCONCLUSIVE: the sampling has not converged", text)
+    why = found.get("contradictions") or [found.get("advice") or "check the records"]
+    text = f"Do not use these intervals: {free('; '.join(why), 600).rstrip('.')}. {numbers}"
+    title = "the fit contradicts the measurement" if found.get("contradictions") else "the sampling has not converged"
+    return Banner("bad", f"INCONCLUSIVE: {title}", text)
 
 
 def _identity(saved):
@@ -81,7 +82,7 @@ def _identity(saved):
         ("Intervals", f"central {level_text(about['level'])} credible intervals, written median [low, high]"),
     ]
     if attributes.get("data_sha256"):
-        rows.append(("Data, SHA-256", short_digest(attributes["data_sha256"])))
+        rows.append(("Data, SHA-256", digests(attributes["data_sha256"].split(","))))
     return Facts(rows + credit)
 
 
@@ -135,7 +136,7 @@ def _reproduction(saved):
         ("Sampler", f"{attributes['inference_library']} {attributes['inference_library_version']}"),
         ("Seed", str(attributes["seed"])),
         ("Data, SHA-256", attributes["data_sha256"] or "not recorded"),
-        ("Time", f"{fixed(saved.indicators['convergence']['seconds'], 0)} s for reduction and sampling"),
+        ("Evaluations", f"{saved.indicators['convergence']['evaluations']} of the marginal posterior density"),
     ]
     return [
         Heading("Reproduction"),

@@ -12,11 +12,12 @@ _TEST = (
     "first loading from 0 to +T is not part of the settled loop."
 )
 _MODEL = (
-    "Angle = offset + geometric + elastic + friction, each driven by the whole torque history. Angle noise "
-    "is white plus correlated; torque noise enters through the slope of the loop. Where the model cannot "
-    "follow the data to the noise, a smooth model error (Gaussian process over torque and branch) is "
-    "inferred with it, and indicators are those of model plus model error. Offsets are integrated out; "
-    "parameters are sampled with emcee in several independent ensembles."
+    "A clean reducer is an odd, rate-independent hysteresis operator, the sum of geometric error, elasticity "
+    "and friction: cells of the Preisach plane with Gaussian weights that all records share, so that any "
+    "amplitude and torque history follow from them. Effects stand beside it at the level of traces, or as "
+    "the hypothesis says. Angle noise is white plus correlated; torque noise and the jitter of crossing "
+    "torques enter through the slope of the loop. Weights, offsets and the noise scale are integrated "
+    "exactly; log scales are sampled with emcee in several independent ensembles."
 )
 _DEFINITIONS = [
     ("T, T_r", "amplitude of a loop; rated torque"),

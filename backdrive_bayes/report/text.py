@@ -41,6 +41,11 @@ def cut(text, longest: int) -> str:
     return (head.rstrip(" ,;:–-") if space and len(head) > longest // 2 else text[: longest - 1]) + "…"
 
 
+def digests(hashes) -> str:
+    """One SHA-256, or several of them, short."""
+    return ", ".join(short_digest(str(h)) for h in ([hashes] if isinstance(hashes, str) else hashes))
+
+
 def short_digest(digest: str) -> str:
     """The first digits of a digest, enough to recognise it; the whole stands under "Reproduction"."""
     return digest if len(digest) <= DIGITS else digest[:DIGITS] + "…"
