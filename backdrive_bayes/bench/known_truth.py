@@ -1,4 +1,4 @@
-"""Bench records of the inference model itself: the truth is inside the model, the noise is a real bench's."""
+"""Bench records of the class itself: the truth is inside the class, the noise is a real bench's."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from backdrive_bayes.model.path import TorquePath
-from backdrive_bayes.model.reducer import ReducerModel
+from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
 from backdrive_bayes.records.record import Record, Unit
+
+KNOTS = np.r_[0.0, np.geomspace(0.004, TOP, 80)]
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,44 @@ class BenchNoise:
     correlated_rad: float = 7e-5
     correlation_time_s: float = 0.03
     torque_nm: float = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class KnownReducer:
+    """A reducer of the class: ``weights`` (cells,) by part, in shares of the angle scale."""
+
+    weights: dict[str, np.ndarray]
+    torque_scale_nm: float = 0.1
+    angle_scale_rad: float = 0.02
+    reducer: ReducerClass = ReducerClass(KNOTS)
+
+    def angle_rad(self, time_s, torque_nm) -> np.ndarray:
+        """Angle [rad] along a torque history of shape (samples,), from the neutral state at its first sample."""
+        history = through(np.r_[time_s[:1], time_s], np.r_[torque_nm[:1], torque_nm], self.torque_scale_nm)
+        total = sum(part.cells.ends(history) @ self.weights[part.name] for part in self.reducer.parts)
+        return total * self.angle_scale_rad
+
+
+def physical_reducer(
+    rng, *, clearance=0.9, drag=0.05, engagement=0.15, compliance=0.5, friction=0.3, threshold=0.05, spread=0.6, scatter=0.1
+) -> KnownReducer:
+    """A reducer near the physical family, every weight with a log-normal ``scatter`` of its own.
+
+    ``clearance``, ``compliance`` and ``friction`` are what is turned under full load, in angle scales; the clearance is crossed
+    about ``drag`` (a share of the torque scale) with a relative standard deviation ``engagement``; plays have log-normal thresholds.
+    """
+    reducer = ReducerClass(KNOTS)
+    elastic, friction_cells, steps = (reducer.part(name).cells for name in ("elastic", "friction", "clearance"))
+    middle = steps.up + 0.5 * steps.width
+    crossed = steps.width * np.exp(-0.5 * ((middle / drag - 1) / engagement) ** 2)
+    plays = np.exp(-0.5 * (np.log(friction_cells.threshold / threshold) / spread) ** 2) * (friction_cells.centre < 0.3)
+    weights = {
+        "elastic": np.full(elastic.count, 2 * compliance),
+        "friction": 2 * friction * plays / (plays @ friction_cells.width),
+        "clearance": clearance * crossed / crossed.sum(),
+        "free_play": np.zeros(steps.count),
+    }
+    return KnownReducer({n: w * np.exp(scatter * rng.standard_normal(w.size)) for n, w in weights.items()})
 
 
 def ramp(amplitude_nm: float, rate_nm_per_s: float, sampling_hz: float = 1000.0, legs=(1, -1, 1)):
@@ -38,20 +78,17 @@ def angle_noise(n: int, step_s: float, noise: BenchNoise, rng) -> np.ndarray:
     return noise.correlated_rad * lfilter([1], [1, -phi], drive) + noise.white_rad * rng.standard_normal(n)
 
 
-def simulate_record(name, model: ReducerModel, values, amplitude_nm, rate_nm_per_s, noise: BenchNoise, rng) -> Record:
-    """One record of a reducer with parameters ``values`` (scalars by name, SI units)."""
-    time, torque = ramp(amplitude_nm, rate_nm_per_s)
-    path = TorquePath.from_samples(torque, time)
-    angle = model.angle({k: np.array([v]) for k, v in values.items()}, path)
-    angle = angle + angle_noise(time.size, time[1] - time[0], noise, rng)
+def simulate_record(name, known: KnownReducer, amplitude_nm, rate_nm_per_s, noise: BenchNoise, rng, sampling_hz=1000.0) -> Record:
+    """One record 0 → +T → −T → +T of a known reducer."""
+    time, torque = ramp(amplitude_nm, rate_nm_per_s, sampling_hz)
+    angle = known.angle_rad(time, torque) + angle_noise(time.size, time[1] - time[0], noise, rng)
     measured = torque + noise.torque_nm * rng.standard_normal(time.size)
     return Record(name, time, measured, angle, rate_nm_per_s, amplitude_nm)
 
 
-def simulate_unit(model: ReducerModel, values, loops, noise: BenchNoise, rng) -> Unit:
-    """A unit with one record for each (amplitude [N·m], rate [N·m/s]) of ``loops``; ``values`` is one mapping a record."""
+def simulate_unit(known: KnownReducer, loops, noise: BenchNoise, rng, sampling_hz: float = 1000.0) -> Unit:
+    """A unit with one record for each (amplitude [N·m], rate [N·m/s]) of ``loops``."""
     records = tuple(
-        simulate_record(f"amplitude-{a:g}-rate-{r:g}.csv", model, v, a, r, noise, rng)
-        for (a, r), v in zip(loops, values, strict=True)
+        simulate_record(f"amplitude-{a:g}-rate-{r:g}.csv", known, a, r, noise, rng, sampling_hz) for a, r in loops
     )
-    return Unit("known-truth", model.scale.torque_nm, records)
+    return Unit("known-truth", known.torque_scale_nm, records)

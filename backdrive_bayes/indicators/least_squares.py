@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from backdrive_bayes.model.published import PublishedLoop
+from backdrive_bayes.mechanics.published import PublishedLoop
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.record import Record
 
@@ -24,8 +24,13 @@ def fit_branch(torque_nm, angle_rad, direction: int) -> PublishedLoop:
     def residual(p):
         return unpack(p).angle_rad(x, direction) - y
 
+    def slopes(p):
+        top = np.tanh(np.exp(p[5]) * x - direction * p[6])
+        rise = p[4] * (1 - top**2)
+        return np.stack([np.ones_like(x), x, x**3, x**5, top, rise * np.exp(p[5]) * x, -direction * rise], axis=1)
+
     starts = ([0.0, 0.4, 0.0, 0.0, 0.5, np.log(b), s * b] for b in (3.0, 30.0) for s in (0.0, 0.05))
-    best = min((least_squares(residual, s, max_nfev=100) for s in starts), key=lambda r: r.cost)
+    best = min((least_squares(residual, s, slopes, max_nfev=100) for s in starts), key=lambda r: r.cost)
     p = unpack(best.x)
     return PublishedLoop(
         p.offset_rad * scale_a + angle_rad.mean(),

@@ -6,7 +6,7 @@ import pytest
 from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators.loop import Loops, torque_grid
 from backdrive_bayes.indicators.summary import core_indicators, interval
-from backdrive_bayes.model.published import PublishedLoop
+from backdrive_bayes.mechanics.published import PublishedLoop
 
 T, SLOPE = 0.1, np.array([[0.2], [0.35]])
 FINE = np.linspace(-T, T, 20001)

@@ -17,7 +17,7 @@ from backdrive_bayes.indicators.indicators import loop_area_j
 from backdrive_bayes.indicators.loop import torque_grid
 from backdrive_bayes.model.friction import CONSTANT_SHARES
 from backdrive_bayes.model.hat_weights import hat_weights
-from backdrive_bayes.model.published import PublishedLoop
+from backdrive_bayes.mechanics.published import PublishedLoop
 
 LOOP = PublishedLoop(0.004, 0.21, 3.0, 40.0, 0.006, 130.0, 0.9, 5e-4)
 SATURATING = {
