@@ -52,10 +52,11 @@ class Contrasts:
 
     def chi2(self, scale) -> float:
         """What is left of the contrasts at the posterior mean, over their number."""
-        inner = self.gram * np.outer(scale, scale)
+        on = scale > 0
+        inner = self.gram[np.ix_(on, on)] * np.outer(scale[on], scale[on])
         inner[np.diag_indices_from(inner)] += 1.0
         lower = cholesky(inner, lower=True, check_finite=False)
-        seen = solve_triangular(lower, scale * self.moment, lower=True, check_finite=False)
+        seen = solve_triangular(lower, scale[on] * self.moment[on], lower=True, check_finite=False)
         return max(self.total - float(seen @ seen), 0.0) / self.samples
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from backdrive_bayes.engine.marginal import Scales
 from backdrive_bayes.engine.reduced import Reduced
-from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import Distortion, Effect, FlankEffect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
@@ -110,9 +110,14 @@ def path_group(reduced: Reduced, effect: PathEffect) -> Group:
 
 
 def tangent_groups(reduced, reducer, design: Design, distortion, weights, effects: tuple[Effect, ...]) -> tuple[Group, ...]:
-    """Derivatives of the class's prediction with ``weights`` by the parameter of every tangent effect that can be told."""
+    """Columns made of the class's prediction with ``weights``: derivatives by the parameter of every tangent effect that can be
+    told, and even counterparts."""
     base, groups = design.predict(weights), []
     for effect in effects:
+        if isinstance(effect, FlankEffect):
+            rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
+            columns = (reducer.flank_columns(h, weights, distortion.exponents, rate) for h, rate in rates)
+            groups.append(Group(effect.name, tuple(columns)))
         if not isinstance(effect, TangentEffect) or not told(reduced, effect):
             continue
         moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + effect.step})

@@ -36,6 +36,10 @@ WIDE = 2.0
 """Standard deviation of an effect's log scale while the mode is sought."""
 USUAL_JITTER = Jitter(0.15, 0.002)
 """Of the bench's torque noise, and of the torque scale."""
+JITTER_LOG_SD = 1.5
+"""Standard deviation of the log jitter about its usual size."""
+JITTERS = tuple(Jitter(size, length) for size in (0.15, 0.5, 1.5, 5.0, 15.0, 45.0) for length in (0.002, 0.01, 0.05))
+"""Sizes and lengths that are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +78,38 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE, e
     """The joint model's mode: damped Gauss-Newton steps for the distortion, knots refined where the residual asks for it."""
     fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)) + extra
     search = _Search(reduced, effects, modules, fixed)
-    trials = [search.run(start, TRIAL_STEPS) for start in possible_starts(reduced)]
+    trials = [search.run(start, TRIAL_STEPS) for start in _apart(possible_starts(reduced), reduced.context)]
     best = max(trials, key=lambda found: found.solution.log_marginal)
     return search.run(best.distortion, STEPS, refine=True)
+
+
+def learn_jitter(linear: Linear) -> Jitter:
+    """The jitter with the highest marginal likelihood times its prior, other things as they are: uphill from the usual one."""
+    reduced, scale = linear.reduced, np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index]
+    noise, slopes, columns = reduced.context.torque_noise, reduced.slopes(linear.predicted), linear.design.records()
+
+    def height(jitter):
+        size = Jitter(jitter.torque * noise, jitter.length)
+        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof)
+        prior = -0.5 * (np.log(jitter.torque / USUAL_JITTER.torque) / JITTER_LOG_SD) ** 2
+        return data.log_marginal(scale) + data.log_volume + prior
+
+    known = {USUAL_JITTER: height(USUAL_JITTER)}
+    best = USUAL_JITTER
+    while True:
+        for other in _neighbours(best):
+            known.setdefault(other, height(other) if other not in known else 0.0)
+        better = max(known, key=known.get)
+        if better == best:
+            return Jitter(best.torque * noise, best.length)
+        best = better
+
+
+def _neighbours(jitter):
+    sizes, lengths = sorted({j.torque for j in JITTERS}), sorted({j.length for j in JITTERS})
+    i, j = sizes.index(jitter.torque), lengths.index(jitter.length)
+    near = ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1))
+    return [Jitter(sizes[a], lengths[b]) for a, b in near if 0 <= a < len(sizes) and 0 <= b < len(lengths)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +121,7 @@ class _Search:
 
     def run(self, distortion: Distortion, steps: int, refine: bool = False) -> Linear:
         reduced, context = self.reduced, self.reduced.context
-        jitter = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
+        jitter, learnt = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length), False
         covariances = reduced.covariances(reduced.slopes(reduced.angles, 2.0), jitter)
         laid, weights, start, refined = None, None, None, 0
         for step in range(steps):
@@ -101,8 +134,10 @@ class _Search:
             linear, start = self._linear(reducer, distortion, weights, covariances, start, jitter)
             weights = linear.weights
             moved = self._moved(linear)
-            covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
             still = _length(moved, distortion, context) < 0.025 * LONGEST_STEP
+            if refine and not learnt and (still or step >= 4):
+                jitter, learnt = learn_jitter(linear), True
+            covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
             if refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
                 knots = _refined(linear)
                 if knots is not None:
@@ -179,6 +214,15 @@ def _towards(distortion, moved, context):
 
 def _far(laid, distortion, context) -> bool:
     return _length(laid, distortion, context) > LEAST_APART * context.torque_noise
+
+
+def _apart(starts, context):
+    """Starts that differ by more than the distance of knots."""
+    kept = []
+    for start in starts:
+        if all(_length(start, other, context) > 2 * LEAST_APART * context.torque_noise for other in kept):
+            kept.append(start)
+    return kept
 
 
 def _refined(linear) -> np.ndarray | None:

@@ -34,12 +34,16 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Whitened:
-    """Whitened columns ``x`` (samples, weights) and data ``y`` (samples,) with the number of independent samples."""
+    """Whitened columns ``x`` (samples, weights) and data ``y`` (samples,) with the number of independent samples.
+
+    ``log_volume`` is what the whitening itself adds to the log marginal likelihood.
+    """
 
     x: np.ndarray
     y: np.ndarray
     samples: int
     noise_dof: float
+    log_volume: float = 0.0
 
     def __post_init__(self):
         object.__setattr__(self, "gram", self.x.T @ self.x)
@@ -121,11 +125,13 @@ def find_scales(data: Whitened, scales: Scales, start=None, sweeps: int = SWEEPS
 
 def whiten(columns, angles, covariances, noise_dof: float) -> Whitened:
     """Whiten records' columns (blocks, weights) and angles (blocks,) and take out each record's offset."""
-    parts = []
+    parts, volume = [], 0.0
     for block, angle, covariance in zip(columns, angles, covariances, strict=True):
         lower = np.linalg.cholesky(covariance)
         both = solve_triangular(lower, np.column_stack([block, angle, np.ones(angle.size)]), lower=True, check_finite=False)
-        one = both[:, -1] / np.linalg.norm(both[:, -1])
+        length = np.linalg.norm(both[:, -1])
+        one = both[:, -1] / length
+        volume -= float(np.log(np.diag(lower)).sum() + np.log(length))
         parts.append(both[:, :-1] - np.outer(one, one @ both[:, :-1]))
     joined = np.concatenate(parts)
-    return Whitened(joined[:, :-1], joined[:, -1], joined.shape[0] - len(parts), noise_dof)
+    return Whitened(joined[:, :-1], joined[:, -1], joined.shape[0] - len(parts), noise_dof, volume)

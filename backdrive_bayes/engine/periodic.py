@@ -9,8 +9,9 @@ import numpy as np
 from backdrive_bayes.engine.design import Group
 from backdrive_bayes.engine.linearise import Linear
 
-FREQUENCIES = np.arange(0.75, 50.0, 0.125)
-"""Waves in one angle scale; the spacing is a quarter of a wave over the whole range."""
+FREQUENCIES = np.arange(3.0, 50.0, 0.125)
+"""Waves in one angle scale: fewer than six over the whole range cannot be told from smooth functions of the angle; the spacing
+is a quarter of a wave over the range."""
 NODES = 12
 """Points within a block at which a wave is followed."""
 

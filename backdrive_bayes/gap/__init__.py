@@ -1,1 +1,1 @@
-"""Where model and measurement part, which unmodelled effect causes it, and how far the gap shrinks once it is added."""
+"""Diagnosis: where model and measurement part, which effect causes it, how far the gap shrinks with it."""

@@ -2,35 +2,48 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 from threadpoolctl import threadpool_limits
 
-from backdrive_bayes.gap import draws, next_test, where
-from backdrive_bayes.gap.candidates import REFERENCE, Candidates, Weighed, weigh_all
-from backdrive_bayes.gap.fast import weigh_fast
-from backdrive_bayes.gap.probabilities import Evidences, credible_set, lasting, marginal, probabilities, unlisted
-from backdrive_bayes.gap.setting import Setting
-from backdrive_bayes.gap.shrink import shrink
-from backdrive_bayes.indicators.summary import loading_rate_nm_per_s
-from backdrive_bayes.inference.discrepancy import amplitude_nm
-from backdrive_bayes.model.registry import BASELINE, candidates_beside
+from backdrive_bayes.engine.design import path_group
+from backdrive_bayes.engine.infer import infer, prepare
+from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.periodic import wave_group
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.gap import next_test, probabilities, where
+from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed, weigh
+from backdrive_bayes.gap.levels import levels
+from backdrive_bayes.gap.parameters import effect_parameters, interval
+from backdrive_bayes.gap.properties import Property, find_properties
+from backdrive_bayes.gap.shrink import Fitted, fit_hypothesis, shrink
+from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
+from backdrive_bayes.indicators.draws import IndicatorDraws
+from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 from backdrive_bayes.records.check import check_unit
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.results import DIAGNOSIS
 
 LEVEL = 0.9
+LEAST_CLOSED = 0.5
+"""A name that closes less of the gap than this on held-out data, with all of its interval below, is unknown."""
+MODULE_ODDS = 3.0
+"""Log odds of a module that every reducer has and the baseline was asked to do without."""
+SHOWN = ("lost_motion_rad", "loop_area_J", "dissipation_ratio")
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found: the contract's object and the names of the effects to add to the model, () for none or unknown."""
+    """What was found: the contract's object, the effects of the chosen model, and its posterior, which is the one that was
+    computed."""
 
     json: dict
     effects: tuple[str, ...]
+    posterior: Posterior
 
 
 def diagnose(
@@ -44,7 +57,7 @@ def diagnose(
 ) -> Diagnosis:
     """Where model and measurement part, which effect causes it, how far the gap shrinks with it.
 
-    ``allowed`` names the effects of the library (default: all that the baseline does not hold).
+    ``allowed`` names the effects of the library (default: all). BadInput where the unit cannot be read as a test.
     """
     # The arrays are small: BLAS threads would spend their time waiting for each other.
     with threadpool_limits(1, user_api="blas"):
@@ -52,153 +65,229 @@ def diagnose(
 
 
 def _diagnose(unit, baseline, seed, allowed, k, progress):
-    began, rng = time.perf_counter(), np.random.default_rng(seed)
-    progress("reducing the records and fitting the baseline")
-    setting = Setting.of(unit, rng, baseline)
-    candidates = weigh_all(setting, rng, progress, allowed)
-    progress("looking for jumps, vibration and encoder error")
-    fast, candidates = weigh_fast(setting, candidates)
-    evidences = Evidences.of(candidates, fast.within(allowed))
-    joint = probabilities(evidences)
-    labels = marginal(joint)
-    likeliest = next(iter(labels))
-    effects = () if likeliest == "none" else tuple(likeliest.split("+"))
-    progress("where, and how far it shrinks")
-    inconclusive = _why_inconclusive(unit, candidates, evidences)
-    found = _Found(setting, candidates, labels, effects, unlisted(joint), inconclusive, rng, k)
-    result = found.as_json(baseline, allowed)
-    result["seconds"] = time.perf_counter() - began
-    named = () if effects == ("unknown",) else effects
-    return Diagnosis(result, named)
+    rng = np.random.default_rng(seed)
+    linear = prepare(unit, BASELINE, progress)
+    withheld = _withheld(linear, baseline)
+    progress("weighing effects")
+    weighed = weigh(linear, allowed)
+    properties = tuple(p for p in find_properties(weighed.linear, rng) if allowed is None or p.name in allowed)
+    joint = probabilities.probabilities(weighed.log_factor, weighed.left, {p.name: p.probability for p in properties})
+    joint = _with_modules(joint, withheld)
+    progress("where it lies and how far it shrinks")
+    found = _Found(unit, weighed, properties, joint, withheld, rng, k, baseline, allowed, seed)
+    return found.finish(progress)
 
 
-def _why_inconclusive(unit, candidates, evidences) -> str:
-    """Why there is no verdict and what to do, empty where there is one."""
-    checked = check_unit(unit)
-    if not checked["may_infer"]:
-        return checked["reason"]
-    if not lasting(evidences, candidates.regained):
-        named = " + ".join(candidates.sought) or "the baseline"
-        return f"the last fresh search still found a better fit of {named}: run it again with another --seed, or add a record"
-    return ""
+def _withheld(linear: Linear, baseline) -> dict[str, float]:
+    """Probability of each module that the baseline lacks, from the log marginal likelihood with and without it."""
+    found = {}
+    for module in BASELINE:
+        if module not in baseline:
+            names = {p.name for p in linear.reducer.parts if p.module == module} | ({"floating"} if module == "geometric" else {"initial"})
+            scale = np.exp([linear.log_scale[n] for n in linear.design.names])
+            without = np.where(np.isin(linear.design.names, list(names)), 1e-6, scale)
+            gain = linear.data.log_marginal(scale[linear.design.index]) - linear.data.log_marginal(without[linear.design.index])
+            found[module] = float(expit(gain / 10.0 + MODULE_ODDS))
+    return found
+
+
+def _with_modules(joint, withheld):
+    for module, p in withheld.items():
+        both = {}
+        for h, w in joint.items():
+            both[h] = both.get(h, 0.0) + w * (1 - p)
+            both[tuple(sorted((*h, module)))] = w * p
+        joint = both
+    return joint
 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    setting: Setting
-    candidates: Candidates
-    labels: dict
-    effects: tuple
-    unlisted: float
-    inconclusive: str
+    unit: Unit
+    weighed: Weighed
+    properties: tuple[Property, ...]
+    joint: dict
+    withheld: dict
     rng: np.random.Generator
     k: float
+    baseline: tuple
+    allowed: tuple | None
+    seed: int
 
-    def as_json(self, baseline, allowed) -> dict:
-        gap = where.estimate_gap(self.setting, self.candidates.none)
-        cells = where.gap_map(self.setting, gap)
-        amplitudes = {row["file"]: row["amplitude_Nm"] for row in self._records()}
-        chosen = self._chosen()
-        whitening = self.setting.whitening(REFERENCE)
-        none = self.candidates.none.fitted
-        z_none, z_chosen = (draws.laplace_draws(f, whitening, self.rng) for f in (none, chosen.fitted))
-        return {
+    @property
+    def linear(self) -> Linear:
+        return self.weighed.linear
+
+    def finish(self, progress) -> Diagnosis:
+        answers = self._labels()
+        likeliest = next(iter(answers))
+        effects = () if likeliest == "none" else tuple(likeliest.split("+"))
+        gap = where.estimate_gap(self.linear, self.rng)
+        before, after = self._fitted(()), self._fitted(effects)
+        shrunk = shrink(self.linear, before, after, gap.weight)
+        closed = shrunk.closed("after", self.rng, LEVEL)
+        if self._hollow(effects, closed):
+            answers = _doubted(answers, likeliest)
+            effects = ("unknown",)
+        inconclusive = _why_inconclusive(self.unit)
+        listed = tuple(e for e in effects if e in all_effects())
+        progress("sampling the chosen model")
+        posterior = infer(self.linear, listed, self.seed, progress)
+        none = posterior if not listed else infer(self.linear, (), self.seed, progress)
+        json = {
             "schema": DIAGNOSIS,
-            "unit": self.setting.unit.name,
-            "baseline": list(baseline),
+            "unit": self.unit.name,
+            "baseline": list(self.baseline),
             "level": LEVEL,
             "k": self.k,
-            "inconclusive": self.inconclusive,
+            "inconclusive": inconclusive,
             "records": self._records(),
-            "gap": self._gap(gap),
-            "where": {"summary": where.summary(cells, amplitudes), "map": cells},
-            "which": self._which(chosen, z_chosen, allowed),
-            "answer": self._answer(),
-            "shrink": self._shrink(none, chosen, gap, z_none, z_chosen),
-            "next_test": self._next_test(whitening),
-            "parameter_shift": draws.shifts(none, z_none, chosen.fitted, z_chosen, LEVEL),
-            "residual": self._residual(none, chosen.fitted),
-            "convergence": None,
+            "gap": {
+                "probability": float(1 - answers.get("none", 0.0)),
+                "unlisted_probability": probabilities.unlisted(self.joint),
+                "rms_rad": gap.rms_rad,
+                "noise_floor_rad": gap.noise_rad,
+            },
+            "where": self._where(gap),
+            "which": self._which(answers, effects, posterior),
+            "answer": {"effects": [] if inconclusive else list(effects), "credible_set_90": probabilities.credible_set(answers)},
+            "shrink": self._shrink(shrunk, closed, none, posterior),
+            "next_test": self._next_test(answers),
+            "parameter_shift": _shifts(none, posterior),
+            "residual": self._residual(before, after),
+            "convergence": posterior.convergence.to_json(),
         }
+        return Diagnosis(json, listed, posterior)
+
+    def _labels(self):
+        modules = set(self.withheld)
+        found: dict[str, float] = {"none": 0.0, "unknown": 0.0}
+        for effects, p in self.joint.items():
+            named = [e for e in effects if e in modules]
+            # A module stays named where something unlisted acts beside it.
+            rest = [] if "unknown" in effects and named else ["unknown"] if "unknown" in effects else [e for e in effects if e not in modules]
+            name = "+".join([*named, *rest]) or "none"
+            found[name] = found.get(name, 0.0) + p
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+    def _fitted(self, effects) -> Fitted:
+        """A hypothesis in the linear model; what has no columns of its own stands for itself by those of the class."""
+        design, linear = self.linear.design, self.linear
+        priors = levels(linear, tuple(effects))
+        if ENCODER in effects:
+            frequency = next(f for h, f in self.weighed.frequency.items() if ENCODER in h)
+            design = design.joined(replace(wave_group(linear, frequency), name="wave"))
+            priors["wave"] = (float(np.log(6e-3)), 1.0)
+        if "unknown" in effects or STICK_SLIP in effects:
+            design = design.joined(path_group(linear.reduced, UNKNOWN))
+            priors[UNKNOWN.name] = (float(np.log(UNKNOWN.present(linear.reduced.context))), 2.0)
+        for module in self.withheld:
+            if module not in effects:
+                for part in linear.reducer.parts:
+                    if part.module == module:
+                        priors[part.name] = (-14.0, 0.0)
+        return fit_hypothesis(linear, effects, design, priors)
+
+    def _hollow(self, effects, closed) -> bool:
+        """Whether a name explains too little of held-out data to be one."""
+        names = set(effects) - {p.name for p in self.properties} - {STICK_SLIP, "unknown", *self.withheld}
+        gap = self.weighed.left[()] > probabilities.CALIBRATION.usual
+        return bool(names) and gap and closed["hi"] < LEAST_CLOSED
 
     def _records(self):
+        reduced = self.linear.reduced
+        rate = reduced.context.rate * reduced.torque_scale_nm
         return [
-            {"file": d.blocks.name, "loading_rate_Nm_per_s": loading_rate_nm_per_s(d)}
-            | {"amplitude_Nm": amplitude_nm(self.setting.problem, r)}
-            for r, d in enumerate(self.setting.problem.records)
+            {"file": b.name, "loading_rate_Nm_per_s": float(v), "amplitude_Nm": float(np.abs(b.turning_nm).max())}
+            for b, v in zip(reduced.blocks, rate, strict=True)
         ]
 
-    def _chosen(self) -> Weighed:
-        """The fitted hypothesis behind the answer: the best named one where the answer is unknown or was seen in fine blocks."""
-        exact = [w for w in self.candidates.weighed if set(w.effects) == set(self.effects)]
-        if exact:
-            return exact[0]
-        inside = [w for w in self.candidates.weighed if set(w.effects) <= set(self.effects)]
-        if self.effects == ("unknown",):
-            return self.candidates.best
-        return max(inside, key=lambda w: (len(w.effects), w.height))
+    def _where(self, gap):
+        cells = where.gap_map(self.linear, gap)
+        amplitudes = {row["file"]: row["amplitude_Nm"] for row in self._records()}
+        return {"summary": where.summary(cells, amplitudes), "map": cells}
 
-    def _gap(self, gap):
-        weight = gap.weight / gap.weight.sum()
-        noise = float(weight @ np.diag(self.setting.noise))
-        return {
-            "probability": float(1 - self.labels.get("none", 0.0)),
-            "unlisted_probability": float(self.unlisted),
-            "rms_rad": float(np.sqrt(weight @ gap.mean**2)),
-            "noise_floor_rad": float(np.sqrt(noise)),
-        }
-
-    def _which(self, chosen, z, allowed):
-        listed = {n for n in candidates_beside(self.setting.problem.model.names) if allowed is None or n in allowed}
-        labels = {name: 0.0 for name in (*sorted(listed), "unknown", "none")} | self.labels
-        table = draws.parameter_table(chosen.fitted, z, LEVEL)
+    def _which(self, answers, effects, posterior):
+        names = [*all_effects(), ENCODER, STICK_SLIP, *(p.name for p in self.properties), *self.withheld]
+        listed = {n: 0.0 for n in names if self.allowed is None or n in self.allowed or n in self.withheld}
         rows = []
-        for label, p in sorted(labels.items(), key=lambda item: -item[1]):
-            row = {"effect": label, "probability": float(p)}
-            mine = {}
+        for label, p in sorted((listed | {"unknown": 0.0, "none": 0.0} | answers).items(), key=lambda item: -item[1]):
+            found = {}
             for name in label.split("+"):
-                if name in chosen.effects:
-                    mine |= draws.effect_parameters(chosen.fitted, table, name)
-            rows.append(row | ({"parameters": mine} if mine else {}))
+                if name in effects:
+                    found |= effect_parameters(self.weighed, self.properties, posterior, name, LEVEL)
+            rows.append({"effect": label, "probability": float(p)} | ({"parameters": found} if found else {}))
         return rows
 
-    def _answer(self):
-        # No name where there is no verdict.
-        names = [] if self.inconclusive else list(self.effects)
-        return {"effects": names, "credible_set_90": credible_set(self.labels)}
-
-    def _shrink(self, none, chosen, gap, z_none, z_chosen):
-        found, several = shrink(self.setting, none, chosen.fitted, gap.weight), len(self.setting.problem.records) > 1
+    def _shrink(self, shrunk, closed, none, posterior):
+        widest = int(np.argmax(posterior.records.amplitude_nm))
+        change = {}
+        for key, drawn in (("before", none), ("after", posterior)):
+            loop = IndicatorDraws(drawn, self.k), drawn.records.rate_nm_per_s[widest], drawn.records.amplitude_nm[widest]
+            for name in SHOWN:
+                values = loop[0].values(name, *loop[1:])
+                change.setdefault(name, {})[key] = interval(values, LEVEL) if np.isfinite(values).all() else None
         return {
-            "held_out": "records left out in turn" if several else "legs left out in turn",
-            **self._shrunk(found),
-            "records": [{"record": name, **self._shrunk(found, fold)} for fold, name in enumerate(found.names)],
-            "indicators_at": self._records()[draws.widest(self.setting)],
-            "gaussian_process": {"closed_fraction": found.closed("control", self.rng, LEVEL)},
-            "indicators": draws.indicator_change(self.setting, none, z_none, chosen.fitted, z_chosen, self.k, LEVEL),
+            "held_out": "records left out in turn" if len(posterior.records.names) > 1 else "legs left out in turn",
+            **_rms(shrunk),
+            "closed_fraction": closed,
+            "records": [
+                {"record": name, **_rms(shrunk, fold), "closed_fraction": shrunk.closed("after", self.rng, LEVEL, fold)}
+                for fold, name in enumerate(shrunk.names)
+            ],
+            "indicators_at": self._records()[widest],
+            "gaussian_process": {"closed_fraction": shrunk.closed("control", self.rng, LEVEL)},
+            "indicators": change,
         }
 
-    def _shrunk(self, found, fold=None):
-        rms = {f"{part}_rad": float(np.sqrt(found.mean_square(part, fold))) for part in ("before", "after")}
-        floor = float(np.sqrt(found.mean_square("floor", fold)))
-        return rms | {"noise_floor_rad": floor, "closed_fraction": found.closed("after", self.rng, LEVEL, fold)}
-
-    def _next_test(self, whitening):
-        fitted = {"+".join(sorted(w.effects)) or "none": w.fitted for w in self.candidates.weighed}
-        likely = [(n, p) for n, p in self.labels.items() if "+".join(sorted(n.split("+"))) in fitted][:2]
-        if len(likely) < 2 or likely[1][1] < 0.01:
+    def _next_test(self, answers):
+        usable = [(n, p) for n, p in answers.items() if n != "unknown"][:2]
+        if len(usable) < 2 or usable[1][1] < 0.01:
             return None
-        pair = tuple(fitted["+".join(sorted(n.split("+")))] for n, _ in likely)
-        return next_test.propose(self.setting, pair, (likely[0][1], likely[1][1]), whitening, self.rng)
+        pair = tuple(self._fitted(() if n == "none" else tuple(n.split("+"))) for n, _ in usable)
+        return next_test.propose(self.linear, pair, (usable[0][1], usable[1][1]))
 
-    def _residual(self, none, chosen):
-        rows = []
-        for r, data in enumerate(self.setting.problem.records):
-            own = self.setting.places.record == r
-            before, after = (f.residual[own] - f.residual[own].mean() for f in (none, chosen))
+    def _residual(self, before, after):
+        rows, scale, linear = [], self.linear.reduced.angle_scale_rad, self.linear
+        curves = [f.design.predict(f.design.split(f.mean)) for f in (before, after)]
+        for r, blocks in enumerate(linear.reduced.blocks):
+            residuals = [(linear.angles[r] - c[r]) * scale for c in curves]
             rows.append({
-                "record": data.blocks.name, "torque_Nm": data.blocks.torque_nm.tolist(),
-                "direction": data.path.direction.astype(int).tolist(), "before_rad": before.tolist(), "after_rad": after.tolist(),
-                "noise_rad": float(np.sqrt(np.median(np.diag(self.setting.noise)[own]))),
+                "record": blocks.name, "torque_Nm": blocks.torque_nm.tolist(),
+                "direction": blocks.direction[blocks.leg].astype(int).tolist(),
+                "before_rad": (residuals[0] - residuals[0].mean()).tolist(),
+                "after_rad": (residuals[1] - residuals[1].mean()).tolist(),
+                "noise_rad": float(np.sqrt(np.median(np.diag(linear.covariances[r])))) * scale,
             })  # fmt: skip
         return rows
+
+
+def _doubted(answers, name):
+    """The probabilities with a name's share given to unknown."""
+    answers = dict(answers)
+    answers["unknown"] = answers.get("unknown", 0.0) + answers.pop(name)
+    return dict(sorted(answers.items(), key=lambda item: -item[1]))
+
+
+def _why_inconclusive(unit) -> str:
+    checked = check_unit(unit)
+    return "" if checked["may_infer"] else checked["reason"]
+
+
+def _rms(shrunk, fold=None):
+    found = {f"{part}_rad": float(np.sqrt(shrunk.mean_square(part, fold))) for part in ("before", "after")}
+    return found | {"noise_floor_rad": float(np.sqrt(shrunk.mean_square("floor", fold)))}
+
+
+def _shifts(before: Posterior, after: Posterior) -> list[dict]:
+    """How the reducer's parameters move when the effect is added, in their own standard deviations."""
+    rows, old, new = [], posterior_parameters(before), posterior_parameters(after)
+    units = {p.name: p.unit for p in PARAMETERS}
+    for name, values in old.items():
+        sd = max(float(np.std(values)), 1e-300)
+        rows.append({
+            "parameter": name, "unit": units[name],
+            "before": interval(values, LEVEL), "after": interval(new[name], LEVEL),
+            "shift_sd": float((np.median(new[name]) - np.median(values)) / sd),
+        })  # fmt: skip
+    return rows

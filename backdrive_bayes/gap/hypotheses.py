@@ -1,212 +1,163 @@
-"""Hypotheses and their fits: the baseline with one or two effects, all parameters fitted jointly."""
+"""Log marginal likelihoods of sets of effects, in the contrasts that the class cannot hold."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import itertools
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import logsumexp
 
-from backdrive_bayes.gap.setting import JointProblem, Setting, Whitening
-from backdrive_bayes.inference.optimum import best_mode
-from backdrive_bayes.inference.starts import FEATURE_STARTS, feature_starts, scattered
-from backdrive_bayes.model.reducer import ReducerModel
-from backdrive_bayes.model.registry import BASELINE, members_named
+from backdrive_bayes.engine.contrasts import SIZE_WEIGHTS, SIZES, Contrasts, averaged, make_contrasts
+from backdrive_bayes.engine.design import Design, Group, path_group
+from backdrive_bayes.engine.jumps import Jumps, find_jumps
+from backdrive_bayes.engine.linearise import Linear, linearise
+from backdrive_bayes.engine.marginal import whiten
+from backdrive_bayes.engine.traces import trace_of
+from backdrive_bayes.engine.periodic import FREQUENCIES, wave_group
+from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 
-SCREENED = 256
-STARTS = 3
-PROBE = 1e-4
-ENOUGH = 0.1
-"""Log posterior that a climb must gain in one of two steps to go on: evidences are told apart by more."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """A hypothesis at its mode: ``residual`` (blocks,) and ``jacobian`` (blocks, dimension) in rad, not whitened.
-
-    ``contributions`` (blocks,) in rad, one an effect: how the angle changes when that effect alone is taken out.
-    """
-
-    effects: tuple[str, ...]
-    problem: JointProblem
-    z: np.ndarray
-    residual: np.ndarray
-    jacobian: np.ndarray
-    contributions: tuple[np.ndarray, ...]
-
-
-def joint_problem(setting: Setting, effects, whitening: Whitening) -> JointProblem:
-    """The unit's problem with ``effects`` added to the baseline."""
-    base = setting.problem
-    model = ReducerModel(members_named([*base.model.names, *effects]), base.model.scale)
-    return JointProblem(model, base.records, 0.0, whitener=whitening.matrix)
-
-
-def fit_from(problem: JointProblem, effects, starts, steps: tuple[int, int] = (6, 12), finalists: int = 2) -> Fitted:
-    """The best mode reached from ``starts`` (starts, dimension): all climb the first number of steps, some the second."""
-    return linearised(problem, effects, best_mode(problem, starts, steps, finalists, ENOUGH))
-
-
-def linearised(problem: JointProblem, effects, z) -> Fitted:
-    """Residual and Jacobian of the residual at ``z``."""
-    n = z.size
-    probes = np.concatenate([z[None], z + PROBE * np.eye(n), z - PROBE * np.eye(n)])
-    raw = problem.raw_residual(probes)
-    contributions = tuple(contribution(problem, z, name) for name in effects)
-    return Fitted(tuple(effects), problem, z, raw[0], (raw[1 : n + 1] - raw[n + 1 :]).T / (2 * PROBE), contributions)
-
-
-def contribution(problem: JointProblem, z, effect: str) -> np.ndarray:
-    """Angle [rad] of all blocks with the effect less that without it, each record's mean taken out, shape (blocks,)."""
-    model, parts = problem.model, []
-    without = replace(model, members=tuple(m for m in model.members if m.name != effect))
-    for r, data in enumerate(problem.records):
-        values = problem.values(z, r)
-        change = model.angle(values, data.path) - without.angle(values, data.path)
-        parts.append(change - change.mean())
-    return np.concatenate(parts)
+ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
+WAVE = 6e-3
+"""Usual amplitude of an encoder's wave in shares of the angle scale."""
+PAIRED = 6
+"""Effects that are tried in pairs: those that explain most alone."""
+CLEAR = 20.0
+"""Log Bayes factor from which an encoder's wave is taken into the linear model before all is weighed again."""
 
 
 @dataclass(frozen=True, eq=False)
-class Screen:
-    """What an effect could do about the residual of a fitted hypothesis: the most promising of many prior draws.
+class Weighed:
+    """Log marginal likelihoods of sets of effects, relative to none, with what they rest on."""
 
-    ``starts`` (starts, dimension) for ``problem``; ``change`` (starts, blocks), the whitened change of the angle at the amplitude
-    that least squares asks for, with what the known parameters can do taken out.
+    linear: Linear
+    log_factor: dict[tuple[str, ...], float]
+    frequency: dict[tuple[str, ...], float]
+    jumps: Jumps
+    left: dict[tuple[str, ...], float]
+    contrasts: float
+    wave: Group | None = field(default=None)
+
+
+def weigh(linear: Linear, allowed=None) -> Weighed:
+    """Weigh none, every effect and the pairs of the most promising; ``allowed`` restricts the names.
+
+    A clear wave is first taken into the linear model, because it leaves residuals that bend everything else.
     """
-
-    problem: JointProblem
-    starts: np.ndarray
-    change: np.ndarray
-
-
-def screen(setting: Setting, known: Fitted, effect: str, whitening: Whitening, rng, draws: int = SCREENED) -> Screen:
-    """Draw the effect's own parameters from their prior and find the amplitude of each draw by least squares."""
-    problem = joint_problem(setting, (*known.effects, effect), whitening)
-    own = np.array([label not in known.problem.labels for label in problem.labels])
-    order = [known.problem.labels.index(label) for label in np.array(problem.labels)[~own]]
-    z = np.empty((draws, problem.dimension))
-    z[:, ~own] = known.z[order]
-    z[:, own] = rng.standard_normal((draws, own.sum()))
-    flexible = Flexible.of(known, whitening)
-    for row, guess in zip(z, _guessed(problem, effect, known, setting.places.record, flexible, whitening), strict=False):
-        _place(problem, row, guess)
-    change = flexible.left((known.residual - problem.raw_residual(z)) @ whitening.matrix.T)
-    size = np.einsum("ij,ij->i", change, change) + 1.0
-    amount = change @ flexible.residual / size
-    gain = amount**2 * size * ((amount > 0) | _signed(problem, own))
-    best = np.argsort(-gain)[:STARTS]
-    starts = z[best]
-    _scale_amplitude(problem, own, starts, amount[best])
-    return Screen(problem, starts, amount[best][:, None] * change[best])
+    found = _weigh(linear, allowed)
+    best = max(found.log_factor, key=found.log_factor.get)
+    if ENCODER in best and found.log_factor[best] > CLEAR:
+        wave = wave_group(linear, found.frequency[best])
+        again = linearise(linear.reduced, linear.effects, linear.reducer.modules, (Group("wave", wave.columns),))
+        if again.solution.log_marginal > linear.solution.log_marginal:
+            return _weigh(_without_wave(again), allowed)
+    return found
 
 
-def _guessed(problem, effect, known, record, flexible, whitening) -> list[dict]:
-    """The points that the effect itself takes for promising beside a known hypothesis, if it has an opinion."""
-    member = next(m for m in problem.model.members if m.name == effect)
-    if not hasattr(member, "guesses"):
-        return []
+def _without_wave(linear: Linear) -> Linear:
+    from dataclasses import replace
 
-    def taken_out(columns):
-        white = flexible.left(columns @ whitening.matrix.T)
-        gram, load = np.einsum("sib,sjb->sij", white, white), white @ flexible.residual
-        ridge = 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[-1])
-        found = np.linalg.solve(gram + ridge, load[..., None])[..., 0]
-        return found, np.einsum("si,si->s", found, load)
-
-    measured = np.concatenate([data.blocks.angle_rad for data in problem.records])
-    return member.guesses(measured - known.residual, record, taken_out)
+    design = Design(tuple(g for g in linear.design.groups if g.name != "wave"))
+    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    scales = {n: s for n, s in linear.log_scale.items() if n != "wave"}
+    keep = linear.design.index != linear.design.names.index("wave")
+    solution = replace(linear.solution, mean=linear.solution.mean[keep], root=linear.solution.root[keep])
+    return replace(linear, design=design, data=data, log_scale=scales, solution=solution)
 
 
-def _place(problem, z, guess):
-    """Overwrite coordinates ``z`` (dimension,) in place by the guessed values of parameters."""
-    for name, value in guess.items():
-        own = [i for i, c in enumerate(problem.coordinates) if c.parameter.name == name]
-        prior = problem.coordinates[own[0]].parameter.scaled_prior(problem.model.scale)
-        z[own] = np.clip(prior.to_normal(value), -3, 3)
+def _weigh(linear: Linear, allowed) -> Weighed:
+    bank = wave_group(linear, FREQUENCIES)
+    contrasts = make_contrasts(linear, (path_group(linear.reduced, UNKNOWN), Group("bank", bank.columns)))
+    table = _Table(linear, contrasts)
+    jumps = find_jumps(linear)
+    jumping = (STICK_SLIP,) if jumps.log_factor > 0 else ()
+    names = [n for n in (*table.terms, ENCODER, *jumping) if n == UNEXPLAINED or allowed is None or n in allowed]
+    log = {(): table.log_marginal(())}
+    for name in names:
+        log[(name,)] = table.log_marginal((name,)) + (jumps.log_factor if name == STICK_SLIP else 0.0)
+    best = sorted(names, key=lambda n: -log[(n,)])[:PAIRED]
+    for pair in itertools.combinations(sorted(best), 2):
+        log[pair] = table.log_marginal(pair) + (jumps.log_factor if STICK_SLIP in pair else 0.0)
+    relative = {h: float(v - log[()]) for h, v in log.items()}
+    left = {h: table.left(h) for h in log if UNEXPLAINED not in h}
+    return Weighed(linear, relative, table.frequency, jumps, left, contrasts.samples)
 
 
-@dataclass(frozen=True, eq=False)
-class Flexible:
-    """A fitted hypothesis whose parameters give way: whitened ``residual`` (blocks,), and what takes its directions out."""
+class _Table:
+    """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods."""
 
-    residual: np.ndarray
-    jacobian: np.ndarray
-    solve: np.ndarray
+    def __init__(self, linear: Linear, contrasts: Contrasts):
+        self.contrasts, context = contrasts, linear.reduced.context
+        effects = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}
+        self.names = contrasts.names
+        self.trace = np.array([trace_of(linear, effects[n]) if n in effects else 0.0 for n in self.names])
+        self.present = np.array([effects[n].present(context) if n in effects else 0.0 for n in self.names])
+        listed = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()}
+        self.terms = {n: t for n, t in listed.items() if any(x in self.names for x in t)} | {UNEXPLAINED: (UNEXPLAINED,)}
+        self.listed = int(np.sum(contrasts.index < len(self.names) - 1))
+        self.frequency: dict[tuple[str, ...], float] = {}
+        self._scans: dict[frozenset, np.ndarray] = {}
 
-    @classmethod
-    def of(cls, fitted: Fitted, whitening: Whitening) -> Flexible:
-        """Linear in the parameters around the mode."""
-        jacobian = whitening.matrix @ fitted.jacobian
-        solve = np.linalg.solve(np.eye(fitted.z.size) + jacobian.T @ jacobian, jacobian.T)
-        residual = whitening.matrix @ fitted.residual - jacobian @ fitted.z
-        return cls(residual - jacobian @ (solve @ residual), jacobian, solve)
+    def scale(self, on, size: float = 1.0) -> np.ndarray:
+        """Standard deviations of all weights where the terms ``on`` are present at ``size`` times their usual level."""
+        level = np.where(np.isin(self.names, list(on)), size * self.present, self.trace)
+        return level[self.contrasts.index]
 
-    def left(self, change):
-        """What of whitened changes (…, blocks) the parameters cannot do."""
-        return change - (change @ self.solve.T) @ self.jacobian.T
+    def log_marginal(self, hypothesis) -> float:
+        """Log marginal likelihood of a set of names, averaged over sizes (and frequencies)."""
+        on = set()
+        for name in hypothesis:
+            # Jumps leave traces in the block means that no slow model explains.
+            on |= set(self.terms.get(UNEXPLAINED if name == STICK_SLIP else name, ()))
+        sizes = SIZES if on else (1.0,)
+        if ENCODER not in hypothesis:
+            found = [self.contrasts.log_marginal(self.scale(on, s)) for s in sizes]
+            return averaged(found) if on else found[0]
+        gains = self._scan(frozenset(on))
+        at = int(np.argmax(gains))
+        self.frequency[hypothesis] = float(FREQUENCIES[at])
+        price = gains[at] - (logsumexp(gains) - np.log(gains.size))
+        found = [averaged([self._with_wave(on, s, at, w) for w in SIZES]) for s in sizes]
+        return (averaged(found) if on else found[0]) - price
 
+    def left(self, hypothesis) -> float:
+        """Variance of the contrasts in noise units that a hypothesis leaves."""
+        on = set()
+        for name in hypothesis:
+            on |= set(self.terms.get(UNEXPLAINED if name == STICK_SLIP else name, ()))
+        scale = self.scale(on, SIZES[-1])
+        if hypothesis in self.frequency:
+            at = self.listed + 2 * int(np.argmin(np.abs(FREQUENCIES - self.frequency[hypothesis])))
+            scale[at : at + 2] = WAVE * SIZES[-1]
+        return self.contrasts.chi2(scale)
 
-def _amplitudes(problem, own):
-    return [i for i in np.flatnonzero(own) if problem.coordinates[i].parameter.null == 0.0]
+    def _with_wave(self, on, size, at, wave):
+        scale = self.scale(on, size)
+        scale[self.listed + 2 * at : self.listed + 2 * at + 2] = wave * WAVE
+        return self.contrasts.log_marginal(scale)
 
-
-def _signed(problem, own):
-    return all(type(problem.coordinates[i].parameter.prior).__name__ == "Normal" for i in _amplitudes(problem, own))
-
-
-def _scale_amplitude(problem, own, starts, amount):
-    """Multiply the parameters that vanish at the null by ``amount`` (starts,), in place and within four prior deviations."""
-    for i in _amplitudes(problem, own):
-        prior = problem.coordinates[i].parameter.scaled_prior(problem.model.scale)
-        value = prior.from_normal(starts[:, i]) * amount
-        with np.errstate(divide="ignore", invalid="ignore"):
-            z = prior.to_normal(value)
-        starts[:, i] = np.clip(np.nan_to_num(z, nan=0.0, posinf=3, neginf=-3), -3, 3)
-
-
-def fit_none(setting: Setting, whitening: Whitening) -> Fitted:
-    """The baseline alone, from the mode found when the unit was prepared."""
-    return fit_from(joint_problem(setting, (), whitening), (), [setting.z])
-
-
-def fit_screened(found: Screen, effects, rng) -> Fitted:
-    """The best mode from the starts of a screen; a module that the baseline was left without is also read off the loop."""
-    starts = found.starts
-    if set(effects) & set(BASELINE):
-        starts = np.concatenate([starts, feature_starts(found.problem, rng)])
-    return fit_from(found.problem, effects, starts)
-
-
-def rebased(fitted: Fitted, other: Fitted) -> Fitted:
-    """The same hypothesis begun anew with the baseline's parameters of another mode."""
-    z = fitted.z.copy()
-    for i, label in enumerate(fitted.problem.labels):
-        if label in other.problem.labels:
-            z[i] = other.z[other.problem.labels.index(label)]
-    return fit_from(fitted.problem, fitted.effects, [z], (0, 15))
-
-
-def simplified(setting: Setting, fitted: Fitted, effects, whitening: Whitening) -> Fitted:
-    """A simpler hypothesis begun from the mode of one that holds it, which may have found a better baseline."""
-    problem = joint_problem(setting, effects, whitening)
-    start = fitted.z[[fitted.problem.labels.index(label) for label in problem.labels]]
-    return fit_from(problem, effects, [start], (0, 20))
-
-
-def polished(fitted: Fitted, rng) -> Fitted:
-    """The same hypothesis climbed to the end, also from what the loops look like without the effects' contributions.
-
-    The baseline's mode may have been a makeshift for the effect that was missing.
-    """
-    problem, change, row, records = fitted.problem, sum(fitted.contributions, 0.0), 0, []
-    for data in problem.records:
-        own = slice(row, row + data.blocks.count.size)
-        angle = data.blocks.angle_rad - (change[own] if fitted.effects else 0.0)
-        records.append(replace(data, blocks=replace(data.blocks, angle_rad=angle)))
-        row = own.stop
-    model = replace(problem.model, members=tuple(m for m in problem.model.members if m.name not in fitted.effects))
-    cleaned = replace(problem, model=model, records=tuple(records))
-    starts = np.repeat(fitted.z[None], FEATURE_STARTS, axis=0)
-    known = [problem.labels.index(label) for label in cleaned.labels]
-    starts[:, known] = feature_starts(cleaned, rng)
-    return fit_from(problem, fitted.effects, np.concatenate([scattered(fitted.z, rng), starts]), (12, 40), 4)
+    def _scan(self, on) -> np.ndarray:
+        """Approximate gain of a wave at every frequency beside the terms ``on``."""
+        if on in self._scans:
+            return self._scans[on]
+        c, m = self.contrasts, self.listed
+        scale = self.scale(on)[:m]
+        inner = c.gram[:m, :m] * np.outer(scale, scale)
+        inner[np.diag_indices_from(inner)] += 1.0
+        lower = cholesky(inner, lower=True, check_finite=False)
+        seen = solve_triangular(lower, scale * c.moment[:m], lower=True, check_finite=False)
+        across = solve_triangular(lower, scale[:, None] * c.gram[:m, m:], lower=True, check_finite=False)
+        precision = (c.noise_dof + c.samples) / (c.noise_dof + max(c.total - seen @ seen, 0.0))
+        left = (c.moment[m:] - across.T @ seen).reshape(-1, 2)
+        pairs = across.T.reshape(-1, 2, m)
+        index = m + np.arange(left.size).reshape(-1, 2)
+        gram = c.gram[index[:, :, None], index[:, None, :]] - np.einsum("fim,fjm->fij", pairs, pairs)
+        gains = []
+        for size in SIZES:
+            variance = (size * WAVE) ** 2
+            inner = np.eye(2) + variance * gram
+            solved = np.linalg.solve(inner, left[:, :, None])[:, :, 0]
+            gains.append(0.5 * precision * variance * np.sum(left * solved, axis=1) - 0.5 * np.linalg.slogdet(inner)[1])
+        self._scans[on] = logsumexp(gains, axis=0, b=SIZE_WEIGHTS[:, None])
+        return self._scans[on]

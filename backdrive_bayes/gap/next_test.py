@@ -4,78 +4,92 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.gap.draws import laplace_draws
-from backdrive_bayes.gap.hypotheses import Fitted
-from backdrive_bayes.gap.setting import Setting, Whitening
-from backdrive_bayes.inference.discrepancy import amplitude_nm
-from backdrive_bayes.model.path import TorquePath
+from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.gap.shrink import Fitted
+from backdrive_bayes.mechanics.effect import FlankEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.history import History, through
 
 POINTS = 80
 NODES = np.polynomial.hermite_e.hermegauss(41)
+TIE = 0.02
+"""Entropy [bits] within which proposals are equally good."""
+AT_ODDS = 0.1
+"""Noise of a prediction beside the measurement's: no formula is exact."""
 
 
-def propose(setting: Setting, pair: tuple[Fitted, Fitted], probability: tuple[float, float], whitening: Whitening, rng) -> dict:
-    """The contract's ``next_test`` for the two hypotheses still most probable."""
-    draws = [laplace_draws(f, whitening, rng)[:100] for f in pair]
-    tests = {text: _drop(_separation(setting, pair, draws, path), probability) for text, path in _paths(setting).items()}
-    if _in_channel(pair[0]) != _in_channel(pair[1]):
-        text = "swap the sensor of the suspected channel for another and repeat the same record"
-        tests[text] = _drop(_swap_separation(setting, pair, whitening), probability)
-    best = max(tests, key=tests.get)
+def propose(linear: Linear, pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> dict:
+    """The contract's ``next_test`` for the two hypotheses that are still most probable."""
+    drops = {}
+    for text, (history, rate) in _tests(linear).items():
+        curves = [_predict(linear, f, history, rate) for f in pair]
+        apart = curves[0] - curves[1]
+        apart = apart - apart.mean()
+        noise = linear.reduced.context.angle_noise
+        drops[text] = _drop(float(apart @ apart) / (noise**2 + AT_ODDS * float(np.var(apart))) / 4.0, probability)
+    best = max(drops.values())
+    ties = [text for text, drop in drops.items() if drop > best - TIE]
     names = ["+".join(f.effects) or "none" for f in pair]
-    return {"do": best, "separates": names, "expected_entropy_drop_bits": float(tests[best]), "others": tests}
+    return {"do": " or: ".join(ties[:3]), "separates": names, "expected_entropy_drop_bits": best, "others": drops}
 
 
-def _paths(setting):
-    amplitude = max(amplitude_nm(setting.problem, r) for r in range(len(setting.problem.records)))
-    rates = [setting.problem.loading_rate_nm_per_s(r) for r in range(len(setting.problem.records))]
-    loop = amplitude * np.array([0, 1, -1, 1])
-    slow, fast = 0.2 * min(rates), 5 * max(rates)
+def _tests(linear):
+    scale, rates = linear.reduced.torque_scale_nm, linear.reduced.context.rate
+    loop = np.array([0.0, 1.0, -1.0, 1.0])
+    slow, fast, usual = 0.2 * rates.min(), 5.0 * rates.max(), float(np.median(rates))
     return {
-        f"repeat the loop at {slow:.3g} N·m/s": _path(loop, slow),
-        f"repeat the loop at {fast:.3g} N·m/s": _path(loop, fast),
-        "repeat the same record": _path(loop, float(np.median(rates))),
-        f"measure the loop at half the amplitude, ±{0.5 * amplitude:.3g} N·m": _path(0.5 * loop, float(np.median(rates))),
-        "load in the negative direction first": _path(-loop, float(np.median(rates))),
-        "dwell for 30 s at each tip": _path(loop, float(np.median(rates)), dwell_s=30.0),
+        f"repeat the loop at {slow * scale:.3g} N·m/s": (_path(loop, slow), slow),
+        f"repeat the loop at {fast * scale:.3g} N·m/s": (_path(loop, fast), fast),
+        "repeat the same record": (_path(loop, usual), usual),
+        f"measure the loop at half the amplitude, ±{0.5 * scale:.3g} N·m": (_path(0.5 * loop, usual), usual),
+        "load in the negative direction first": (_path(-loop, usual), usual),
+        "dwell for 30 s at each tip": (_path(loop, usual, 30.0), usual),
     }
 
 
-def _path(turning, rate, dwell_s=0.0):
-    base = TorquePath.from_turning_points(turning, POINTS, rate)
-    time = base.time_s + dwell_s * np.concatenate([np.full(leg.stop - leg.start, k) for k, leg in enumerate(base.legs)])
-    return TorquePath(base.torque_nm, time, base.start_torque_nm, base.legs)
+def _path(turning, rate, dwell_s=0.0) -> History:
+    torque = np.concatenate([np.linspace(a, b, POINTS)[:-1] for a, b in zip(turning[:-1], turning[1:], strict=True)] + [turning[-1:]])
+    time = np.r_[0.0, np.cumsum(np.abs(np.diff(torque)))] / rate
+    leg = np.repeat(np.arange(turning.size - 1), POINTS - 1)
+    return through(time + dwell_s * np.r_[0, leg], torque, 1.0)
 
 
-def _separation(setting, pair, draws, path):
-    """Squared distance of the two predictions in units of their own uncertainty and the noise."""
-    curves = [f.problem.model.angle(f.problem.values(z, 0), path) for f, z in zip(pair, draws, strict=True)]
-    curves = [c - c.mean(axis=1, keepdims=True) for c in curves]
-    apart = curves[0].mean(axis=0) - curves[1].mean(axis=0)
-    covariance = sum(np.cov(c.T) for c in curves) / 2 + (setting.noise_rad**2) * np.eye(path.torque_nm.size)
-    return float(apart @ np.linalg.solve(covariance, apart))
-
-
-def _swap_separation(setting, pair, whitening):
-    channel = pair[0] if _in_channel(pair[0]) else pair[1]
-    return float(sum((whitening.matrix @ c) @ (whitening.matrix @ c) for c in channel.contributions))
-
-
-def _in_channel(fitted):
-    stages = {m.name: m.stage for m in fitted.problem.model.members}
-    return any(stages[name].channel for name in fitted.effects)
+def _predict(linear: Linear, fitted: Fitted, history: History, rate: float) -> np.ndarray:
+    """Angle at the segments' ends that a hypothesis expects, in shares of the angle scale."""
+    weights = fitted.design.split(fitted.mean)
+    context = linear.reduced.context
+    log_rate = float(np.log(rate) - np.log(context.rate).mean())
+    base = linear.reducer.ends(history, linear.distortion.exponents, log_rate)
+    angle = sum(base[n] @ weights[n] for n in base)
+    z, direction = history.z1, np.sign(history.z1 - history.z0)
+    slope = np.gradient(angle, np.arange(angle.size)) / np.maximum(np.abs(np.gradient(z, np.arange(z.size))), 1e-9)
+    for effect in linear.effects:
+        weight = weights.get(effect.name)
+        if weight is None:
+            continue
+        if isinstance(effect, PathEffect):
+            columns = effect.responses(history, 0, context)[1]
+            angle = angle + columns @ weight[: columns.shape[1]]
+        elif isinstance(effect, FlankEffect):
+            mean = {n: weights[n] for n in base}
+            angle = angle + linear.reducer.flank_columns(history, mean, linear.distortion.exponents, log_rate, ends=True) @ weight
+        elif isinstance(effect, TangentEffect):
+            away = float(weight[0]) - getattr(linear.distortion, effect.parameter)
+            by = {"offset": direction * slope, "lag_s": -rate * slope}.get(effect.parameter)
+            if by is None:
+                by = log_rate * slope * np.abs(z) * -direction * 0.1
+            angle = angle + away * by
+    return angle
 
 
 def _drop(separation, probability):
     """Expected entropy drop [bits] between two hypotheses whose predictions are ``separation`` apart, squared."""
     p = probability[0] / max(sum(probability), 1e-300)
-    # Half the distance counts: formulas are approximate.
-    distance = np.sqrt(min(0.5 * separation, 400.0))
+    distance = np.sqrt(min(separation, 400.0))
     after = 0.0
     for truth, sign in ((p, 1.0), (1 - p, -1.0)):
         odds = np.log(max(p, 1e-12) / max(1 - p, 1e-12)) + sign * 0.5 * distance**2 + distance * NODES[0]
         after += truth * np.sum(NODES[1] * _entropy(1 / (1 + np.exp(-np.clip(odds, -60, 60))))) / np.sum(NODES[1])
-    return max(_entropy(p) - after, 0.0)
+    return float(max(_entropy(p) - after, 0.0))
 
 
 def _entropy(p):

@@ -1,8 +1,7 @@
-"""How far the gap shrinks on data left out of the fit once an effect is added, with a flexible control beside it.
+"""How far the gap shrinks on data left out of the fit once an effect is added, with a control that names no cause beside it.
 
-Records are left out in turn, or legs where there is one record. What the parameters' mode given the rest foretells is compared,
-without and with the effect. What belongs to a left-out record alone no other tells (the encoder's offset, the loop's past, a
-wave's phase, its own drift): it is fitted to that record under its prior.
+Records are held out in turn, or legs where there is one record. Weights are those of the rest; what belongs to the held-out record
+alone (its offset, initial state, drift) is fitted to it under its prior, for no other record tells it.
 """
 
 from __future__ import annotations
@@ -10,27 +9,43 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 
-from backdrive_bayes.gap.draws import Z_BOUND
-from backdrive_bayes.gap.hypotheses import ENOUGH, PROBE, Fitted
-from backdrive_bayes.gap.setting import MISFIT_LENGTH, Setting
+from backdrive_bayes.engine.design import Design
+from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.marginal import Scales, find_scales, whiten
 
-MOST_STEPS = 30
-SHORTENED = np.array([0.0, 0.05, 0.25, 0.5, 1.0])
-"""Lengths at which a Gauss-Newton step is tried."""
 RESAMPLED = 400
 FEWEST_PIECES = 4
 SMALLEST_GAP = 0.2
-MISFIT = ("misfit", MISFIT_LENGTH, 0.3)
+"""A gap of less than this share of the noise floor counts as that much: shares of nothing mean nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A hypothesis ready for prediction: its design, the scales of its weights at their mode, and its name."""
+
+    effects: tuple[str, ...]
+    design: Design
+    scale: np.ndarray
+    mean: np.ndarray
+
+
+def fit_hypothesis(linear: Linear, effects, design: Design, priors) -> Fitted:
+    """Scales and weights of a hypothesis on all records."""
+    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    scales: Scales = design.scales(priors)
+    start = np.array([linear.log_scale.get(n, priors[n][0]) for n in design.names])
+    log_scale, solution = find_scales(data, scales, np.where(scales.free, start, scales.mean))
+    return Fitted(tuple(effects), design, scales.of_weights(log_scale), solution.mean)
 
 
 @dataclass(frozen=True, eq=False)
 class Shrink:
-    """What is left out, piece by piece (up to four of a leg, by the torque), arrays of shape (pieces,).
+    """What is held out, piece by piece, arrays of shape (pieces,).
 
-    ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``, ``control`` and
-    ``floor`` are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the control, and noise.
+    ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``, ``control`` and ``floor``
+    are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the control, and noise.
     """
 
     names: tuple[str, ...]
@@ -44,13 +59,12 @@ class Shrink:
     def mean_square(self, part: str, fold: int | None = None) -> float:
         """Mean square [rad²] of one part in one fold, or over all of them."""
         own = np.full(self.fold.size, True) if fold is None else self.fold == fold
-        return float(getattr(self, part)[own].sum() / self.share[own].sum())
+        return float(getattr(self, part)[own].sum() / max(self.share[own].sum(), 1e-300))
 
     def closed(self, part: str, rng, level: float, fold: int | None = None) -> dict:
-        """Closed fraction of ``after`` or ``control``, and its central interval where other data would have been left out.
+        """Closed fraction of ``after`` or ``control`` with its central interval by a Bayesian bootstrap over folds and pieces.
 
-        The interval is that of a Bayesian bootstrap over folds and their pieces (Rubin, Annals of Statistics 9, 1981); of fewer
-        than ``FEWEST_PIECES`` pieces there is none: both ends are the value itself.
+        Source: Rubin, Annals of Statistics 9, 1981. Of fewer than ``FEWEST_PIECES`` pieces there is none: both ends are the value.
         """
         own = np.full(self.fold.size, True) if fold is None else self.fold == fold
         folds, number = np.unique(self.fold[own], return_inverse=True)
@@ -67,86 +81,101 @@ class Shrink:
         return {"median": middle, "lo": min(float(lo), middle), "hi": max(float(hi), middle)}
 
 
-def shrink(setting: Setting, before: Fitted, after: Fitted, weight) -> Shrink:
-    """Predict every fold from the others; ``weight`` (blocks,) is the torque that a block spans."""
-    torque = np.concatenate([d.blocks.torque_nm for d in setting.problem.records])
-    leg = np.concatenate([d.blocks.leg for d in setting.problem.records])
+def shrink(linear: Linear, before: Fitted, after: Fitted, weight) -> Shrink:
+    """Predict every fold from the others; ``weight`` holds the torque that each block spans, by record."""
+    folds = _folds(linear)
+    record = np.repeat(np.arange(len(linear.angles)), [a.size for a in linear.angles])
+    torque = np.concatenate([b.torque_nm for b in linear.reduced.blocks])
+    leg = np.concatenate([b.leg for b in linear.reduced.blocks])
+    span, scale = np.concatenate(weight), linear.reduced.angle_scale_rad
+    variance = np.concatenate([np.diag(c) for c in linear.covariances]) * scale**2
     columns = []
-    for number, own in enumerate(_folds(setting).values()):
-        share = weight[own] / weight[own].sum()
+    for number, own in enumerate(folds.values()):
+        share = span[own] / span[own].sum()
+        residuals = [_held_out(linear, f, own, record) * scale for f in (before, after)]
+        residuals.append(residuals[0] - _control(linear, before, own, record) * scale)
         place = np.floor(2 * torque[own] / np.abs(torque[own]).max()).astype(int)
-        piece = np.unique(np.stack([leg[own], place]), axis=1, return_inverse=True)[1]
-        squares = (*(_left_out(setting, f, own, share) for f in (before, after)), _control(setting, before, own, share))
-        parts = (share, *squares, share * np.diag(setting.noise)[own])
-        sums = np.array([np.bincount(piece.ravel(), p) for p in parts])
+        piece = np.unique(np.stack([leg[own], place]), axis=1, return_inverse=True)[1].ravel()
+        parts = (share, *(share * (r - r @ share) ** 2 for r in residuals), share * variance[own])
+        sums = np.array([np.bincount(piece, p) for p in parts])
         columns.append(np.concatenate([np.full((1, sums.shape[1]), number), sums]))
     fold, *rest = np.concatenate(columns, axis=1)
-    return Shrink(tuple(_folds(setting)), fold, *rest)
+    return Shrink(tuple(folds), fold, *rest)
 
 
-def _folds(setting):
-    data = setting.problem.records
-    if len(data) > 1:
-        return {d.blocks.name: np.flatnonzero(setting.places.record == r) for r, d in enumerate(data)}
-    # One record: its later whole legs in turn, the first leg is never left out.
-    legs = data[0].blocks.leg
+def _folds(linear):
+    """Rows of each fold by name: records, or later whole legs of a single one."""
+    sizes = [a.size for a in linear.angles]
+    ends = np.cumsum([0, *sizes])
+    blocks = linear.reduced.blocks
+    if len(sizes) > 1:
+        return {b.name: np.arange(a, z) for b, a, z in zip(blocks, ends[:-1], ends[1:], strict=True)}
+    legs = blocks[0].leg
     return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in range(1, legs.max() + 1)} or {"all": np.arange(legs.size)}
 
 
-def _left_out(setting, fitted, own, share):
-    """Squared residual on ``own`` of what the rest foretells, times the blocks' shares, shape (own blocks,)."""
-    record, problem = setting.places.record, fitted.problem
-    gone = set(record[own]) - set(record[np.setdiff1d(np.arange(record.size), own)])
-    of_own = np.array([c.record in gone for c in problem.coordinates])
-    z = _climbed(setting, problem, fitted.z, np.flatnonzero(~of_own), np.setdiff1d(np.arange(record.size), own))
-    if of_own.any():
-        z = _climbed(setting, problem, z, np.flatnonzero(of_own), own)
-    residual = problem.raw_residual(z[None])[0, own]
-    return share * (residual - residual @ share) ** 2
+def _held_out(linear: Linear, fitted: Fitted, own, record) -> np.ndarray:
+    """Residual (own blocks,) of what the rest predicts, what belongs to the held-out record alone fitted to it."""
+    columns, angle = np.vstack(fitted.design.records()), np.concatenate(linear.angles)
+    rest = np.setdiff1d(np.arange(record.size), own)
+    gone = np.setdiff1d(record[own], record[rest])
+    weights = np.zeros(columns.shape[1])
+    if rest.size:
+        weights = _ridge(linear, columns, angle, rest, record, fitted.scale, np.ones(columns.shape[1], bool))
+    if gone.size:
+        alone = _alone(fitted.design, int(gone[0]))
+        left = angle - columns[:, ~alone] @ weights[~alone]
+        weights[alone] = _ridge(linear, columns, left, own, record, fitted.scale, alone)[alone]
+    return angle[own] - columns[own] @ weights
 
 
-def _climbed(setting, problem, z, free, rows):
-    """Coordinates at the mode of the ``free`` ones given some blocks only, the others held."""
-    record = setting.places.record[rows]
-    lower = cholesky(setting.covariance(MISFIT)[np.ix_(rows, rows)], lower=True)
-    basis = np.linalg.qr(solve_triangular(lower, (record[:, None] == np.unique(record)).astype(float), lower=True))[0]
-
-    def white(points):
-        values = solve_triangular(lower, problem.raw_residual(points)[:, rows].T, lower=True)
-        return values - basis @ (basis.T @ values)
-
-    probe = PROBE * np.eye(z.size)[free]
-    for _ in range(MOST_STEPS):
-        near = white(np.concatenate([z[None], z + probe, z - probe]))
-        residual, jacobian = near[:, 0], (near[:, 1 : free.size + 1] - near[:, free.size + 1 :]) / (2 * PROBE)
-        step = np.zeros(z.size)
-        step[free] = -np.linalg.solve(np.eye(free.size) + jacobian.T @ jacobian, jacobian.T @ residual + z[free])
-        tried = np.clip(z + SHORTENED[:, None] * step, -Z_BOUND, Z_BOUND)
-        cost = 0.5 * (np.sum(white(tried) ** 2, axis=0) + np.sum(tried**2, axis=1))
-        z = tried[int(np.argmin(cost))]
-        if cost[0] - cost.min() < ENOUGH:
-            break
-    return z
+def _alone(design: Design, record: int) -> np.ndarray:
+    """Which weights belong to one record alone, (weights,)."""
+    found = []
+    for group in design.groups:
+        if group.own:
+            found += [np.full(c.shape[1], r == record) for r, c in enumerate(group.columns)]
+        else:
+            found.append(np.full(group.width, False))
+    return np.concatenate(found)
 
 
-def _control(setting, fitted, own, share):
-    """The same of a Gaussian process over the loop that was fitted to the rest of the baseline's residual, (own blocks,)."""
-    rest = np.setdiff1d(np.arange(setting.places.record.size), own)
-    kernel = setting.kernel("loop", MISFIT_LENGTH) * np.var(fitted.residual)
-    factor = cho_factor(kernel[np.ix_(rest, rest)] + setting.noise[np.ix_(rest, rest)], lower=True)
-    left = fitted.residual[rest] - _record_means(fitted.residual, setting.places.record)[rest]
-    residual = fitted.residual[own] - kernel[np.ix_(own, rest)] @ cho_solve(factor, left)
-    return share * (residual - residual @ share) ** 2
+def _ridge(linear, columns, angle, rows, record, scale, used) -> np.ndarray:
+    """Posterior mean of the ``used`` weights given some rows, offsets by record integrated."""
+    gram, moment = np.zeros((used.sum(), used.sum())), np.zeros(used.sum())
+    start = np.searchsorted(record, np.arange(record.max() + 1))
+    for r in np.unique(record[rows]):
+        at = rows[record[rows] == r]
+        covariance = linear.covariances[r][np.ix_(at - start[r], at - start[r])]
+        factor = cho_factor(covariance, lower=True, check_finite=False)
+        both = np.column_stack([columns[np.ix_(at, np.flatnonzero(used))], angle[at], np.ones(at.size)])
+        solved = cho_solve(factor, both, check_finite=False)
+        inner = both.T @ solved
+        inner = inner - np.outer(inner[:, -1], inner[-1]) / inner[-1, -1]
+        gram += inner[:-2, :-2]
+        moment += inner[:-2, -2]
+    s = scale[used]
+    inner = gram * np.outer(s, s)
+    inner[np.diag_indices_from(inner)] += 1.0
+    weights = np.zeros(used.size)
+    weights[used] = s * cho_solve(cho_factor(inner, lower=True, check_finite=False), s * moment, check_finite=False)
+    return weights
 
 
-def _record_means(values, record):
-    return (np.bincount(record, values) / np.bincount(record))[record]
+def _control(linear, fitted, own, record) -> np.ndarray:
+    """What the mean residual of the other folds at the same leg and torque predicts: a smoother that names no cause."""
+    columns, angle = np.vstack(fitted.design.records()), np.concatenate(linear.angles)
+    residual = angle - columns @ fitted.mean
+    torque = np.concatenate([b.torque_nm for b in linear.reduced.blocks]) / linear.reduced.torque_scale_nm
+    direction = np.concatenate([b.direction[b.leg] for b in linear.reduced.blocks])
+    rest = np.setdiff1d(np.arange(record.size), own)
+    for r in np.unique(record):
+        residual[record == r] -= residual[record == r].mean()
+    near = np.exp(-0.5 * ((torque[own, None] - torque[rest]) / 0.05) ** 2) * (direction[own, None] == direction[rest])
+    return near @ residual[rest] / (near.sum(axis=1) + 1.0)
 
 
 def closed_fraction(before, after, floor) -> np.ndarray:
-    """(rms before − rms after) / (rms before − noise floor), of mean squares [rad²], within −1 and 1.
-
-    A gap of less than a fifth of the noise floor counts as that much: shares of nothing mean nothing.
-    """
+    """(rms before − rms after) / (rms before − noise floor), of mean squares [rad²], within −1 and 1."""
     gap = np.sqrt(before) - np.sqrt(floor)
     return np.clip((np.sqrt(before) - np.sqrt(after)) / np.maximum(gap, SMALLEST_GAP * np.sqrt(floor)), -1.0, 1.0)

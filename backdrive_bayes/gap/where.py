@@ -5,63 +5,72 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
-from backdrive_bayes.gap.candidates import Weighed
-from backdrive_bayes.gap.setting import Setting
-from backdrive_bayes.inference.discrepancy import amplitude_nm
+from backdrive_bayes.engine.design import path_group
+from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.marginal import find_scales, whiten
+from backdrive_bayes.gap.levels import levels
+from backdrive_bayes.mechanics.registry import UNKNOWN
 from backdrive_bayes.records.branches import cycle_numbers, find_segments
 
 BRANCHES = ("load+", "unload+", "load-", "unload-")
 BINS = 5
 """Torque bins from zero to the tip on each branch."""
 CREDIBLE = 1.645
-KERNELS = (("loop", 0.06), ("own_loop", 0.06), ("time_smooth", 0.1))
 
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """The baseline's gap at the blocks: posterior mean [rad] (blocks,), its covariance, and the torque each block spans."""
+    """What the clean class leaves at the blocks of each record: posterior mean [rad] and draws of its error, (blocks,) and
+    (blocks, draws); ``weight`` the torque that each block spans; ``noise_rad`` the noise of the blocks."""
 
-    mean: np.ndarray
-    covariance: np.ndarray
-    weight: np.ndarray
+    mean: tuple[np.ndarray, ...]
+    error: tuple[np.ndarray, ...]
+    weight: tuple[np.ndarray, ...]
+    noise_rad: float
 
-
-def estimate_gap(setting: Setting, none: Weighed) -> Gap:
-    """The smooth part of the baseline's residual, offsets taken out, given the noise."""
-    fitted, level = none.fitted, max(_level(setting, none), 0.3)
-    prior = sum((level * setting.noise_rad) ** 2 * setting.kernel(k, length) / len(KERNELS) for k, length in KERNELS)
-    factor = cho_factor(prior + setting.noise, lower=True)
-    ones = (setting.places.record[:, None] == np.arange(setting.places.record.max() + 1)).astype(float)
-    inverse_ones = cho_solve(factor, ones)
-    offset = np.linalg.solve(ones.T @ inverse_ones, inverse_ones.T @ fitted.residual)
-    residual = fitted.residual - ones @ offset
-    solved = cho_solve(factor, prior)
-    span = np.concatenate([np.abs(np.diff(d.blocks.edges_nm(), axis=0))[0] for d in setting.problem.records])
-    return Gap(solved.T @ residual, prior - prior @ solved, span)
+    @property
+    def rms_rad(self) -> float:
+        """Root mean square of the mean, weighted by torque."""
+        return float(np.sqrt(sum(w @ m**2 for w, m in zip(self.weight, self.mean, strict=True)) / sum(w.sum() for w in self.weight)))
 
 
-def _level(setting, none):
-    """Size of the residual in noise units."""
-    excess = np.var(none.fitted.residual) - np.mean(np.diag(setting.noise))
-    return float(np.sqrt(max(excess, 0.0)) / setting.noise_rad)
+def estimate_gap(linear: Linear, rng) -> Gap:
+    """The process along each leg beside the clean class, all effects at trace level."""
+    group = path_group(linear.reduced, UNKNOWN)
+    design = linear.design.joined(group)
+    priors = levels(linear, ()) | {UNKNOWN.name: (float(np.log(UNKNOWN.present(linear.reduced.context))), 2.0)}
+    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    scales = design.scales(priors)
+    start = np.array([linear.log_scale.get(n, priors[n][0]) for n in design.names])
+    _, solution = find_scales(data, scales, np.where(scales.free, start, scales.mean))
+    own = design.index == design.names.index(UNKNOWN.name)
+    noise = rng.standard_normal((solution.root.shape[1], 200)) * np.sqrt(solution.variance)
+    scale, mean, error = linear.reduced.angle_scale_rad, [], []
+    for r in range(len(linear.angles)):
+        columns = group.of_record(r) * scale
+        columns = columns - columns.mean(axis=0)
+        mean.append(columns @ solution.mean[own])
+        error.append(columns @ (solution.root[own] @ noise))
+    weight = tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] for b in linear.reduced.blocks)
+    variance = [np.diag(c) for c in linear.covariances]
+    floor = sum(w @ v for w, v in zip(weight, variance, strict=True)) / sum(w.sum() for w in weight)
+    return Gap(tuple(mean), tuple(error), weight, float(np.sqrt(floor)) * scale)
 
 
-def gap_map(setting: Setting, gap: Gap) -> list[dict]:
+def gap_map(linear: Linear, gap: Gap) -> list[dict]:
     """The contract's ``where.map``: one entry a record, branch, cycle and torque bin, shares summing to one."""
-    cells, energy = [], gap.weight * gap.mean**2
-    start = 0
-    for r, data in enumerate(setting.problem.records):
-        n = data.blocks.count.size
-        torque, direction, cycle = data.blocks.torque_nm, data.path.direction, _cycles(setting.unit.records[r], data.blocks)
-        amplitude = amplitude_nm(setting.problem, r)
-        branch = branch_of(torque, direction)
-        place = np.minimum((np.abs(torque) / amplitude * BINS).astype(int), BINS - 1)
-        for key in sorted({*zip(cycle, branch, place, strict=True)}):
-            own = np.flatnonzero((cycle == key[0]) & (branch == key[1]) & (place == key[2])) + start
-            cells.append(_cell(data.blocks.name, key, own, gap, energy, amplitude))
-        start += n
+    cells = []
+    total = sum(float(w @ m**2) for w, m in zip(gap.weight, gap.mean, strict=True))
+    for r, blocks in enumerate(linear.reduced.blocks):
+        record = next(x for x in linear.reduced.unit.records if x.name == blocks.name)
+        cycle = np.array(cycle_numbers(record.torque_nm, find_segments(record.time_s, record.torque_nm)))[blocks.leg]
+        amplitude = float(np.abs(blocks.turning_nm).max())
+        branch = branch_of(blocks.torque_nm, blocks.direction[blocks.leg])
+        place = np.minimum((np.abs(blocks.torque_nm) / amplitude * BINS).astype(int), BINS - 1)
+        for key in sorted({*zip(cycle.tolist(), branch.tolist(), place.tolist(), strict=True)}):
+            own = (cycle == key[0]) & (branch == key[1]) & (place == key[2])
+            cells.append(_cell(blocks.name, key, own, gap, r, total, amplitude))
     return cells
 
 
@@ -71,25 +80,21 @@ def branch_of(torque_nm, direction) -> np.ndarray:
     return np.where(positive, np.where(rising, 0, 1), np.where(rising, 3, 2))
 
 
-def _cell(name, key, own, gap, energy, amplitude):
+def _cell(name, key, own, gap, r, total, amplitude):
     cycle, branch, place = key
-    weight = gap.weight[own] / gap.weight[own].sum()
-    mean = float(weight @ gap.mean[own])
-    sd = float(np.sqrt(max(weight @ gap.covariance[np.ix_(own, own)] @ weight, 0.0)))
+    part = gap.weight[r][own]
+    weight = part / part.sum()
+    mean = float(weight @ gap.mean[r][own])
+    sd = float((weight @ gap.error[r][own]).std())
     sign = 1.0 if branch in (0, 1) else -1.0
     bounds = sorted(sign * amplitude * np.array([place, place + 1]) / BINS)
     return {
         "record": name, "branch": BRANCHES[branch], "cycle": int(cycle),
         "torque_lo_Nm": float(bounds[0]), "torque_hi_Nm": float(bounds[1]),
-        "share": float(energy[own].sum() / max(energy.sum(), 1e-300)),
-        "signed_rms_rad": float(np.copysign(np.sqrt(weight @ gap.mean[own] ** 2), mean)),
+        "share": float(part @ gap.mean[r][own] ** 2 / max(total, 1e-300)),
+        "signed_rms_rad": float(np.copysign(np.sqrt(weight @ gap.mean[r][own] ** 2), mean)),
         "credible": bool(abs(mean) > CREDIBLE * sd),
     }  # fmt: skip
-
-
-def _cycles(record, blocks):
-    segments = find_segments(record.time_s, record.torque_nm)
-    return np.array(cycle_numbers(record.torque_nm, segments))[blocks.leg]
 
 
 def summary(cells: list[dict], amplitudes: dict[str, float]) -> str:

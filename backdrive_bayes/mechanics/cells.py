@@ -56,15 +56,15 @@ class Cells:
         down = np.where(clearance, factor * self.down, self.down - shift)
         return Cells(up, down, scale * self.width, scale * self.norm)
 
-    def means(self, history: History, state: str = "neutral") -> np.ndarray:
-        """Block means of the responses, shape (blocks, cells)."""
-        return self._paired(_means, history, state, (history.z0, history.z1, history.weight, history.block, history.blocks))
+    def means(self, history: History, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
+        """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks that differ)."""
+        return self._paired(_means, history, state, (history.z0, history.z1, history.weight, history.block, history.blocks), sign)
 
-    def ends(self, history: History, state: str = "neutral") -> np.ndarray:
+    def ends(self, history: History, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
         """Responses at the end of every segment, shape (segments, cells)."""
-        return self._paired(_ends, history, state, (history.z1,))
+        return self._paired(_ends, history, state, (history.z1,), sign)
 
-    def _paired(self, kernel, history, state, arguments):
+    def _paired(self, kernel, history, state, arguments, sign):
         up, down = np.r_[self.up, -self.down - self.width], np.r_[self.down, -self.up - self.width]
         width = np.r_[self.width, self.width]
         high, low = np.clip(history.start - down, 0.0, width), np.clip(history.start - up, 0.0, width)
@@ -72,7 +72,8 @@ class Cells:
         if first is None:
             first = np.clip(np.clip(history.start - 0.5 * (up + down), 0.0, width), low, high)
         response = kernel(*arguments, up, down, width, first)
-        return (response[:, : self.count] + response[:, self.count :] - self.width) / self.norm
+        centred = response - 0.5 * width
+        return (centred[:, : self.count] + sign * centred[:, self.count :]) / self.norm
 
 
 def join(*cells: Cells) -> Cells:

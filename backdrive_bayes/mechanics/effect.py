@@ -77,6 +77,11 @@ class TangentEffect(Effect):
 
 
 @dataclass(frozen=True)
+class FlankEffect(Effect):
+    """Flanks that differ: the even counterparts of the class's parts at their present weights, one column a part."""
+
+
+@dataclass(frozen=True)
 class Distortion:
     """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
 

@@ -24,7 +24,7 @@ READ_OUTS = (0.0, 0.04, 0.12, 0.28, 0.5, 0.75, 0.9, 1.0)
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
 INITIAL_THRESHOLDS = (0.01, 0.04, 0.12, 0.3, 0.6)
 """Thresholds at which a record's friction may have been left anywhere."""
-ZONES = 6
+ZONES = 12
 """Groups of clearance relays whose first state is free in each record."""
 BASELINE = ("geometric", "elastic", "friction")
 
@@ -80,6 +80,15 @@ class ReducerClass:
     def ends(self, history: History, exponents=(0.0, 0.0), log_rate: float = 0.0) -> dict[str, np.ndarray]:
         """The same at the end of every segment."""
         return {p.name: p.mix(self._cells(p, exponents, log_rate).ends(history)) for p in self.parts}
+
+    def flank_columns(self, history: History, weights, exponents=(0.0, 0.0), log_rate: float = 0.0, ends: bool = False):
+        """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
+        columns = []
+        for part in self.parts:
+            cells = self._cells(part, exponents, log_rate)
+            even = cells.ends(history, sign=-1.0) if ends else cells.means(history, sign=-1.0)
+            columns.append(even @ part.weights(weights[part.name]))
+        return np.stack(columns, axis=1)
 
     def initial_columns(self, history: History, clearance_weights=None, exponents=(0.0, 0.0), log_rate: float = 0.0):
         """What a record's unknown initial state adds: columns of friction left up or down, and of clearance zones left up.

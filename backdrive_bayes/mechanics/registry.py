@@ -6,7 +6,7 @@ from functools import lru_cache
 from importlib.metadata import entry_points
 
 from backdrive_bayes.mechanics.effect import Effect
-from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
+from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS
 from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_RATE, FRICTION_RATE
 from backdrive_bayes.mechanics.effects.sensor_lag import SENSOR_LAG
 from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
@@ -19,7 +19,7 @@ LIBRARY: dict[str, tuple[Effect, ...]] = {
     "sensor_lag": (SENSOR_LAG,),
     "rate_dependent_friction": (FRICTION_RATE, DRAG_RATE),
     "thermal_drift": (THERMAL_DRIFT,),
-    "asymmetric_stiffness": (ASYMMETRIC_STIFFNESS,),
+    "asymmetric_stiffness": (ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS),
     "viscoelastic_creep": (VISCOELASTIC_CREEP,),
 }
 """Effects by the name that an answer gives them, each with the terms that it consists of."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from backdrive_bayes.mechanics.effect import PathEffect
+from backdrive_bayes.mechanics.effect import FlankEffect, PathEffect
 
 NODES = np.array([0.0, 0.08, 0.25, 0.5, 0.75, 1.2])
 
@@ -26,3 +26,18 @@ class AsymmetricStiffness(PathEffect):
 
 
 ASYMMETRIC_STIFFNESS = AsymmetricStiffness("asymmetric_stiffness", "oddness", "even in the torque", "elastic deflection of two flanks", "rad")
+
+
+class UnequalFlanks(FlankEffect):
+    """Elasticity, friction and clearance each differ between the flanks by a share of themselves."""
+
+    def trace(self, context):
+        """A fifth of a per cent."""
+        return 2e-3
+
+    def present(self, context):
+        """Five per cent."""
+        return 0.05
+
+
+UNEQUAL_FLANKS = UnequalFlanks("unequal_flanks", "oddness", "even in the torque, with hysteresis", "as for the stiffness", "1")

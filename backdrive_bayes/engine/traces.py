@@ -1,0 +1,25 @@
+"""How large the trace of an effect may be on this unit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.engine.linearise import Linear
+
+HEIGHT = 0.3
+"""Standard deviations of the noise by which a trace may move the angle where it acts most."""
+
+
+def trace_of(linear: Linear, effect) -> float:
+    """Trace level of an effect's weights: its own; for an exponent of the rate what moves the angle by HEIGHT, if that is more."""
+    own = effect.trace(linear.reduced.context)
+    if not getattr(effect, "parameter", "").endswith("exponent") or effect.name not in linear.design.names:
+        return own
+    group = linear.design.groups[linear.design.names.index(effect.name)]
+    heights = []
+    for column, slope, noise in zip(group.columns, linear.reduced.slopes(linear.predicted), linear.reduced.noise, strict=True):
+        sd = np.hypot(noise.correlated_rad, slope * noise.torque_nm) / linear.reduced.angle_scale_rad
+        heights.append(column[:, 0] / sd)
+    z = np.concatenate(heights)
+    height = np.sqrt(np.sum(z**4) / max(np.sum(z**2), 1e-300))
+    return float(max(own, HEIGHT / max(height, 1e-12)))

@@ -1,0 +1,24 @@
+"""Prior scales of every group of columns under a hypothesis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.engine.design import class_priors
+from backdrive_bayes.engine.infer import PRESENT_SD
+from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.traces import trace_of
+from backdrive_bayes.mechanics.registry import all_effects
+
+
+def levels(linear: Linear, hypothesis: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    """Mean and standard deviation of each group's log scale: effects of the hypothesis are free, all others at trace level."""
+    priors = class_priors(linear.reducer)
+    present = {t.name for n in hypothesis for t in all_effects().get(n, ())}
+    for effect in linear.effects:
+        on = effect.name in present
+        level = effect.present(linear.reduced.context) if on else trace_of(linear, effect)
+        priors[effect.name] = (float(np.log(level)), PRESENT_SD if on else 0.0)
+    for name in linear.design.names:
+        priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))
+    return priors

@@ -1,0 +1,50 @@
+"""Parameters of the effects that a diagnosis names, with intervals and units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed
+from backdrive_bayes.mechanics.effect import PathEffect, TangentEffect
+from backdrive_bayes.mechanics.registry import all_effects
+
+
+def effect_parameters(weighed: Weighed, properties, posterior: Posterior, effect: str, level: float) -> dict:
+    """Parameters of one effect by name, each with median, lo, hi and unit."""
+    for found in properties:
+        if found.name == effect:
+            place = {"median": found.torque_nm, "lo": found.torque_nm, "hi": found.torque_nm, "unit": "N·m"}
+            return {"angle": interval(found.size_rad, level) | {"unit": "rad"}, "torque": place}
+    if effect == STICK_SLIP:
+        size = weighed.jumps.size_rad
+        return {"jump": {"median": size, "lo": size, "hi": size, "unit": "rad"}}
+    if effect == ENCODER:
+        period = next((1.0 / f for h, f in weighed.frequency.items() if effect in h), float("nan"))
+        period *= weighed.linear.reduced.angle_scale_rad
+        return {"period": {"median": period, "lo": period, "hi": period, "unit": "rad"}}
+    return _of_terms(weighed, posterior, effect, level)
+
+
+def _of_terms(weighed, posterior, effect, level):
+    rows, context = {}, posterior.context
+    for term in all_effects().get(effect, ()):
+        if term.name not in posterior.flat:
+            continue
+        weights = posterior.flat[term.name]
+        if isinstance(term, TangentEffect):
+            factor = context.torque_scale_nm if term.unit == "N·m" else 1.0
+            rows[term.parameter] = interval(weights[:, 0] * factor, level) | {"unit": term.unit}
+        elif isinstance(term, PathEffect):
+            group = weighed.linear.design.groups[weighed.linear.design.names.index(term.name)]
+            columns = np.vstack([group.of_record(r) for r in range(len(group.columns))])
+            columns = columns - columns.mean(axis=0)
+            size = np.sqrt(np.mean((weights @ columns.T) ** 2, axis=1)) * context.angle_scale_rad
+            rows[f"{term.name}_rms"] = interval(size, level) | {"unit": "rad"}
+    return rows
+
+
+def interval(values, level: float) -> dict:
+    """Median and central interval of draws."""
+    lo, median, hi = np.quantile(values, [0.5 - level / 2, 0.5, 0.5 + level / 2])
+    return {"median": float(median), "lo": float(lo), "hi": float(hi)}
