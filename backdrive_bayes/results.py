@@ -13,6 +13,8 @@ VERDICT = "backdrive-bayes/verdict/1"
 COMPARISON = "backdrive-bayes/comparison/1"
 BLIND = "backdrive-bayes/blind/1"
 POSTERIOR = "backdrive-bayes/posterior/2"
+UNREADABLE = (OSError, ValueError, LookupError, RuntimeError, TypeError, AttributeError, ArithmeticError, MemoryError)
+"""What the readers of HDF5 raise on a damaged file."""
 
 
 def read_result(path: Path, schema: str) -> dict:
@@ -36,7 +38,7 @@ def read_group(path: Path, group: str):
     try:
         with xarray.open_dataset(path, group=group, engine="h5netcdf") as dataset:
             loaded = dataset.load()
-    except (OSError, ValueError, KeyError) as error:
+    except UNREADABLE as error:
         raise BadInput(path, f"a posterior.nc with group '{group}'", f"unreadable file ({type(error).__name__})") from None
     if loaded.attrs.get("schema") != POSTERIOR:
         raise BadInput(path, f"schema '{POSTERIOR}'", repr(loaded.attrs.get("schema")))

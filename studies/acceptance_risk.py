@@ -2,8 +2,8 @@
 
     python studies/acceptance_risk.py --units 40 --workers 2 --out reports/acceptance-risk
 
-Every unit's parameters are drawn from the prior and its records simulated with a bench's noise, without and with an effect that
-the model does not hold (creep: part of the compliance answers late). Upper limits are then put around the true indicators, up to
+Every unit's parameters are drawn about the usual ones and its records simulated with a bench's noise, without and with an effect
+that the model does not hold (creep: part of the compliance answers late). Upper limits are then put around the true indicators, up to
 four posterior standard deviations away on either side, as often within as out of limits. Written: acceptance_risk.json. Realised
 risks are those of the verdict: of the units accepted the share that is out of limits, of the units rejected the share within.
 "near" counts only decisions whose stated risk is more than half the agreed one. The naive decision compares the classic
@@ -27,42 +27,33 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import beta
 
-from backdrive_bayes.bench.known_truth import BenchNoise, ramp, simulate_unit
+from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, ramp, random_reducer, simulate_unit
+from backdrive_bayes.commands.results import FitOptions, fit_unit
 from backdrive_bayes.decisions.conformance import Risks, Verdict, conformance_probability
-from backdrive_bayes.indicators.draws import CORE
-from backdrive_bayes.indicators.least_squares import least_squares_json
+from backdrive_bayes.indicators.draws import CORE, IndicatorDraws, core_indicators
 from backdrive_bayes.indicators.loop import Loops, torque_grid
-from backdrive_bayes.indicators.summary import core_indicators, monitored, reducer_loops
-from backdrive_bayes.inference.fit import fit
-from backdrive_bayes.inference.sampling import Settings
-from backdrive_bayes.model.parameter import Scale
-from backdrive_bayes.model.path import TorquePath
-from backdrive_bayes.model.reducer import ReducerModel
-from backdrive_bayes.model.registry import BASELINE, members_named
 
 RATED, RATE, K = 0.1, 0.05, 0.03
-SCALE = Scale(RATED, 0.02)
 OFFSETS = np.linspace(-4, 4, 40)
 """Where limits are put about the truth, in posterior standard deviations; none exactly on it."""
 CREEP_SHARE, CREEP_SECONDS = 0.08, 2.0
 CONSUMER, PRODUCER = 0.05, 0.10
-SPREAD = 0.5
-"""Standard deviation of the units' parameters in the standard-normal coordinates of the prior."""
+COMPLIANCE = 0.1
+"""Of a usual reducer [rad/(N·m)]."""
 
 
-def creep(time_s, torque_nm, compliance):
+def creep(time_s, torque_nm):
     """Delayed part of the deflection [rad], shape (samples,): a share of the compliance that answers with one time constant."""
     keep = np.exp(-(time_s[1] - time_s[0]) / CREEP_SECONDS)
-    return CREEP_SHARE * compliance * lfilter([1 - keep], [1, -keep], torque_nm)
+    return CREEP_SHARE * COMPLIANCE * lfilter([1 - keep], [1, -keep], torque_nm)
 
 
-def true_indicators(model, values, delayed: bool) -> dict[str, float]:
+def true_indicators(known: KnownReducer, delayed: bool) -> dict[str, float]:
     """Indicators of the noise-free settled loop at the records' rate, from a record of several cycles."""
     time_s, torque = ramp(RATED, RATE, legs=(1, *(-1, 1) * 4))
-    angle = model.angle({k: np.array([v]) for k, v in values.items()}, TorquePath.from_samples(torque, time_s))
-    angle = angle + (creep(time_s, torque, values["compliance"]) if delayed else 0.0)
+    angle = known.angle_rad(time_s, torque) + (creep(time_s, torque) if delayed else 0.0)
     n = int(round(2 * RATED / RATE * 1000))
-    grid = torque_grid(RATED, (K * RATED,))
+    grid = torque_grid(RATED, (K * RATED, *known.reducer.knots * RATED))
     falling = np.interp(grid, torque[-2 * n - 1 : -n][::-1], angle[-2 * n - 1 : -n][::-1])
     rising = np.interp(grid, torque[-n - 1 :], angle[-n - 1 :])
     return {k: float(v[0]) for k, v in core_indicators(Loops(grid, rising[None], falling[None]), K * RATED).items()}
@@ -70,23 +61,21 @@ def true_indicators(model, values, delayed: bool) -> dict[str, float]:
 
 def one_unit(job) -> dict:
     """Fit one simulated unit; truth, thinned draws and the classic estimate of every indicator."""
-    seed, delayed, budget = job
+    seed, delayed = job
     rng = np.random.default_rng([20261201, seed])
-    model = ReducerModel(members_named(BASELINE), SCALE)
-    values = {p.name: p.scaled_prior(SCALE).from_normal(SPREAD * rng.normal()) for p in model.parameters}
-    unit = simulate_unit(model, [values], [(RATED, RATE)], BenchNoise(), rng)
+    known = random_reducer(rng)
+    unit = simulate_unit(known, [(RATED, RATE)], BenchNoise(), rng)
     if delayed:
         record = unit.records[0]
-        time_s, torque = ramp(RATED, RATE)
-        late = creep(time_s, torque, values["compliance"])
+        late = creep(*ramp(RATED, RATE))
         unit = replace(unit, records=(replace(record, angle_rad=record.angle_rad + late),))
     began = time.perf_counter()
-    posterior = fit(unit, seed=seed, scale=SCALE, settings=Settings(max_seconds=budget), quantities=monitored(K))
-    loops = reducer_loops(posterior.problem, posterior.discrepancy, posterior.z, posterior.weights, 0, K)
-    draws = core_indicators(loops, K * RATED)
-    classic = least_squares_json(unit.records[0], RATED, K)["indicators"]
-    truth = true_indicators(model, values, delayed)
-    thin = {name: np.sort(values)[:: max(1, values.size // 400)].tolist() for name, values in draws.items()}
+    posterior, about = fit_unit(unit, FitOptions(k=K, seed=seed))
+    draws, own = IndicatorDraws(posterior, K), posterior.records
+    classic = about["records"][0]["least_squares"]["indicators"]
+    truth = true_indicators(known, delayed)
+    values = {name: np.sort(draws.values(name, own.rate_nm_per_s[0], own.amplitude_nm[0])) for name in CORE}
+    thin = {name: v[:: max(1, v.size // 400)].tolist() for name, v in values.items()}
     found = {name: {"truth": truth[name], "draws": thin[name], "naive": classic[name]} for name in CORE}
     return {"seed": seed, "converged": posterior.converged, "seconds": time.perf_counter() - began, "indicators": found}
 
@@ -154,7 +143,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--units", type=int, default=40)
     parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--budget", type=float, default=60.0)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--effects", choices=("both", "none", "creep"), default="both")
     parser.add_argument("--out", type=Path, default=Path("reports/acceptance-risk"))
@@ -166,7 +154,7 @@ def main():
             if given.effects != "both" and delayed != (given.effects == "creep"):
                 continue
             results = []
-            for result in pool.map(one_unit, [(s, delayed, given.budget) for s in seeds]):
+            for result in pool.map(one_unit, [(s, delayed) for s in seeds]):
                 results.append(result)
                 print(f"{label}: unit {result['seed']}, converged {result['converged']}, {result['seconds']:.0f} s", flush=True)
             summary[label] = tally(results) | {"near_with_halved_intervals": tally(results, 0.5)["consumer_risk_near"]}

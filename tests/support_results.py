@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 
 GROUP_ATTRIBUTES = {
-    "schema": "backdrive-bayes/posterior/1",
+    "schema": "backdrive-bayes/posterior/2",
     "unit": "u",
     "data_sha256": "0123456789abcdef" * 4,
     "modules": "geometric,elastic,friction",
@@ -16,7 +16,7 @@ GROUP_ATTRIBUTES = {
     "inference_library_version": "3.1.6",
     "versions": "backdrive-bayes 0.1.0; numpy 2.0; Python 3.11",
 }
-PARAMETERS = {"clearance": ("rad", 0.039), "drag_torque": ("N·m", 0.004), "friction_ratio": ("1", 0.05)}
+PARAMETERS = {"clearance_rad": ("rad", 0.039), "drag_torque_Nm": ("N·m", 0.004), "load_friction_ratio": ("1", 0.05)}
 RATES = (0.01, 0.05, 0.1)
 CHAINS, DRAWS, BLOCKS = 3, 60, 30
 
@@ -43,12 +43,9 @@ def branch(torque, direction):
 
 def indicators(records, shared=PARAMETERS):
     parameters = {
-        k: interval(v) | {"unit": u, "prior": "log-normal, median 0.01, log-sd 1"}
+        k: interval(v) | {"unit": u, "definition": f"what {k} means", "null": 0.0, "prior_interval": interval(2 * v, 0.9)}
         for k, (u, v) in shared.items()
     }
-    for r in range(records):
-        about = {"median": 0.1, "lo": -0.9, "hi": 0.9, "unit": "1", "prior": "uniform on [-1, 1]"}
-        parameters[f"initial_gap_position[{r}]"] = about
     return {
         "schema": "backdrive-bayes/indicators/1",
         "unit": "u",
@@ -60,11 +57,15 @@ def indicators(records, shared=PARAMETERS):
             "max_rhat": 1.004,
             "min_bulk_ess": 1500.0,
             "min_tail_ess": 1200.0,
-            "seconds": 4.0,
-            "worst": "initial_gap_position[0]",
+            "evaluations": 4000,
+            "worst": "friction",
             "advice": "",
+            "contradictions": [],
         },
-        "model_error": {"scale_rad": 6e-4},
+        "jitter": {"torque_Nm": 2e-5, "length_Nm": 1e-3},
+        "data_sha256": ["0123456789abcdef" * 4],
+        "seed": 7,
+        "versions": "backdrive-bayes 0.1.0; numpy 2.0; Python 3.11",
         "parameters": parameters,
         "records": [_record(r) for r in range(records)],
     }
@@ -75,18 +76,17 @@ def _record(r):
     rising, falling = branch(torque, 1), branch(torque, -1)
     positive = np.linspace(0, 0.1, 21)
     energy = 0.03 * np.exp(-(((positive - 0.004) / 0.004) ** 2)) + 1e-3
-    share = {"model_error_share": 0.91}
     return {
         "file": f"record-{r}",
         "loading_rate_Nm_per_s": RATES[r % 3] * 10 ** (r // 3),
         "amplitude_Nm": 0.1,
         "indicators": {
-            "lost_motion_rad": interval(0.0095) | share,
-            "zero_torque_width_rad": interval(0.0292, 0.006) | share,
-            "peak_angle_rad": interval(0.03254 + 1e-4 * r, 0.001) | share,
-            "loop_area_J": interval(3.63e-4, 0.005) | share,
-            "absorbed_J": interval(1.55e-3, 0.005) | share,
-            "dissipation_ratio": interval(0.2343, 0.006) | share,
+            "lost_motion_rad": interval(0.0095),
+            "zero_torque_width_rad": interval(0.0292, 0.006),
+            "peak_angle_rad": interval(0.03254 + 1e-4 * r, 0.001),
+            "loop_area_J": interval(3.63e-4, 0.005),
+            "absorbed_J": interval(1.55e-3, 0.005),
+            "dissipation_ratio": interval(0.2343, 0.006),
         },
         "loop": {
             "torque_Nm": torque.tolist(),
@@ -147,8 +147,7 @@ def _write_posterior(path, records, parameters):
         for k, (_, v) in parameters.items()
     }
     groups = {
-        "posterior": shared
-        | {"offset": (("chain", "draw", "record"), np.full((CHAINS, DRAWS, records), 0.5))},
+        "posterior": shared,
         "sample_stats": {"lp": (("chain", "draw"), rng.standard_normal((CHAINS, DRAWS)))},
         "posterior_predictive": {"angle_rad": (("chain", "draw", "block"), np.tile(angle, records) + noise)},
         "observed_data": {
@@ -159,6 +158,7 @@ def _write_posterior(path, records, parameters):
             "leg": (("block",), np.tile(np.repeat([0, 1, 2], BLOCKS), records)),
             "block_record": (("block",), np.repeat(np.arange(records), n)),
             "turning_nm": (("turn",), np.tile([0.0, 0.1, -0.1, 0.1], records)),
+            "offset_rad": (("record",), np.full(records, 0.5)),
             "turning_record": (("turn",), np.repeat(np.arange(records), 4)),
         },
     }

@@ -13,8 +13,8 @@ ORDER = (
     "errors",
     "results",
     "records",
-    "model",
-    "inference",
+    "mechanics",
+    "engine",
     "indicators",
     "decisions",
     "bench",
@@ -29,12 +29,10 @@ ORDER = (
 """A room imports only from itself and from rooms to its left."""
 
 FORBIDDEN = {
-    "records": {"model"},
-    "model": {"records"},
-    "bench": {"inference", "indicators"},
+    "bench": {"engine", "indicators"},
     # A figure or a report is made from saved results and computes nothing.
-    "figures": {"records", "model", "inference", "indicators", "decisions", "bench", "gap", "blind"},
-    "report": {"records", "model", "inference", "indicators", "decisions", "bench", "gap", "blind"},
+    "figures": {"records", "mechanics", "engine", "indicators", "decisions", "bench", "gap", "blind"},
+    "report": {"records", "mechanics", "engine", "indicators", "decisions", "bench", "gap", "blind"},
 }
 HEAVY = ("matplotlib", "corner", "typst", "dask", "pyarrow", "nptdms", "openpyxl", "asammdf")
 
@@ -115,10 +113,10 @@ def test_there_is_no_cycle():
 
 
 def test_the_checks_see_what_they_forbid():
-    assert wrong_way("backdrive_bayes.records.noise", "from backdrive_bayes.model.path import TorquePath")
-    assert wrong_way("backdrive_bayes.model.play", "def f():\n    import backdrive_bayes.inference.fit")
+    assert wrong_way("backdrive_bayes.records.noise", "from backdrive_bayes.mechanics.cells import Cells")
+    assert wrong_way("backdrive_bayes.mechanics.cells", "def f():\n    import backdrive_bayes.engine.infer")
     assert wrong_way("backdrive_bayes.figures.loop", "import backdrive_bayes.indicators.loop")
-    assert wrong_way("backdrive_bayes.inference.problem", "from ..indicators.loop import Loops")
+    assert wrong_way("backdrive_bayes.engine.infer", "from ..indicators.loop import Loops")
     assert cycle({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == ["a", "b", "c", "a"]
 
 
@@ -127,7 +125,7 @@ def importers_of(library):
 
 
 def test_emcee_is_known_to_one_module():
-    assert importers_of("emcee") == {"backdrive_bayes.inference.sampling"}
+    assert importers_of("emcee") == {"backdrive_bayes.engine.sample"}
 
 
 @pytest.mark.parametrize("library", HEAVY)
@@ -144,7 +142,7 @@ def loaded_after(statement):
 
 
 def test_the_core_loads_no_optional_library():
-    loaded = loaded_after("import backdrive_bayes.inference.fit, backdrive_bayes.indicators.summary")
+    loaded = loaded_after("import backdrive_bayes.engine.infer, backdrive_bayes.indicators.summary")
     assert not loaded & set(HEAVY)
     assert "emcee" in loaded, "the subprocess must have loaded the core for this to mean something"
     assert "pyarrow" in loaded_after("import pyarrow")
@@ -170,25 +168,10 @@ def test_decisions_load_no_optional_library():
     assert not loaded_after("import backdrive_bayes.api") & {*HEAVY}
 
 
-def test_members_are_named_in_the_registry_only():
-    """A new effect is one file and one line: nothing else imports a member's module."""
-    plumbing = {
-        "bend",
-        "gap",
-        "kernels",
-        "hat_weights",
-        "member",
-        "parameter",
-        "path",
-        "play",
-        "published",
-        "reducer",
-        "registry",
-        "relaxation",
-        "effects",
-        "",
-    }
-    members = {m for m in MODULES if room(m) == "model" and (m.split(".") + [""])[2] not in plumbing or ".model.effects." in m}
-    assert len(members) >= 15
-    for member in members:
-        assert {m for m in MODULES if member in own_imports(m)} <= {"backdrive_bayes.model.registry"}, member
+def test_effects_are_named_in_the_registry_only():
+    """A new effect is one file and one line: nothing else imports an effect's module."""
+    effects = {m for m in MODULES if ".mechanics.effects." in m}
+    assert len(effects) >= 7
+    for effect in effects:
+        users = {m for m in MODULES if effect in own_imports(m)}
+        assert users <= {"backdrive_bayes.mechanics.registry", *effects}, effect

@@ -46,7 +46,7 @@ def physical_reducer(
     """A reducer near the physical family, every weight with a log-normal ``scatter`` of its own.
 
     ``clearance``, ``compliance`` and ``friction`` are what is turned under full load, in angle scales; the clearance is crossed
-    about ``drag`` (a share of the torque scale) with a relative standard deviation ``engagement``; plays have log-normal thresholds.
+    about ``drag`` (a share of the torque scale) with a relative standard deviation ``engagement``; thresholds are log-normal.
     """
     reducer = ReducerClass(KNOTS)
     elastic, friction_cells, steps = (reducer.part(name).cells for name in ("elastic", "friction", "clearance"))
@@ -60,6 +60,12 @@ def physical_reducer(
         "free_play": np.zeros(steps.count),
     }
     return KnownReducer({n: w * np.exp(scatter * rng.standard_normal(w.size)) for n, w in weights.items()})
+
+
+def random_reducer(rng, log_sd: float = 0.4) -> KnownReducer:
+    """A physical reducer whose numbers vary log-normally about the usual ones."""
+    usual = {"clearance": 0.9, "drag": 0.05, "engagement": 0.2, "compliance": 0.5, "friction": 0.3, "threshold": 0.05}
+    return physical_reducer(rng, **{n: v * np.exp(log_sd * rng.standard_normal()) for n, v in usual.items()})
 
 
 def ramp(amplitude_nm: float, rate_nm_per_s: float, sampling_hz: float = 1000.0, legs=(1, -1, 1)):

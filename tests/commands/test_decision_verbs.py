@@ -3,21 +3,22 @@
 import json
 
 import pytest
-from support.decided import TYPICAL, diagnosis, write_evidence
+from support.decided import diagnosis, write_evidence
+from support.made_posterior import made_fit
 
 from backdrive_bayes.commands.main import main
 
-AREA = TYPICAL["loop_area_J"]
+AREA = made_fit("a")[1]["records"][1]["indicators"]["loop_area_J"]["median"]
 
 
 @pytest.fixture(scope="module")
 def fits(tmp_path_factory):
     room = tmp_path_factory.mktemp("fits")
     write_evidence(room / "a", name="a")
-    write_evidence(room / "b", name="b", seed=1, loop_area_J=2 * AREA)
+    write_evidence(room / "b", name="b", seed=1, size=2.0)
     write_evidence(room / "c", name="c", converged=False)
     write_evidence(room / "gap", name="a", diagnosis=diagnosis(["unknown"], unknown=0.9, none=0.1))
-    write_evidence(room / "other-model", name="a", effects=["sensor_lag"], loop_area_J=3 * AREA)
+    write_evidence(room / "other-model", name="a", effects=["sensor_lag"], size=3.0)
     return room
 
 

@@ -28,7 +28,7 @@ def test_loads_that_cannot_be_answered_are_refused_at_once(case, unit_folder, tm
 def test_loads_are_answered_in_the_file_and_on_the_screen(unit_folder, tmp_path, capsys, monkeypatch):
     out = tmp_path / "out"
     loads = ["--load", "0.5", "--load", "-1.5", "--load-rate", "0.25"]
-    code = main(["fit", str(unit_folder), "-o", str(out), "--budget", "300", "--no-figures", *loads])
+    code = main(["fit", str(unit_folder), "-o", str(out), "--no-figures", *loads])
     rows = json.loads((out / "indicators.json").read_text())["loads"]
     assert [(r["load_Nm"], r["loading_rate_Nm_per_s"]) for r in rows] == [(0.5, 0.25), (-1.5, 0.25)]
     for row in rows:
@@ -41,9 +41,9 @@ def test_loads_are_answered_in_the_file_and_on_the_screen(unit_folder, tmp_path,
 
 
 def test_without_loads_there_is_no_such_key_and_python_may_ask_later(unit_folder):
-    fitted = backdrive_bayes.fit(unit_folder, budget=0.5, seed=1)
+    fitted = backdrive_bayes.fit(unit_folder, seed=1)
     assert "loads" not in fitted.indicators
-    asked = backdrive_bayes.fit(unit_folder, budget=0.5, seed=1, loads=[0.5], load_rate=1.0).indicators["loads"]
+    asked = backdrive_bayes.fit(unit_folder, seed=1, loads=[0.5], load_rate=1.0).indicators["loads"]
     later = fitted.back_drive(0.5, rate=1.0)
     assert asked[0].keys() == later[0].keys()
     assert asked[0]["theta_L_rad"]["median"] == pytest.approx(later[0]["theta_L_rad"]["median"], rel=0.05)

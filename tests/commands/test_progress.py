@@ -92,10 +92,9 @@ def test_elsewhere_there_are_plain_lines_and_few(capsys, monkeypatch):
 
 BAD = {
     "--baseline": ["--baseline", "foo"],
-    "repeated module": ["--baseline", "elastic,elastic"],
+    "no elasticity": ["--baseline", "geometric,friction"],
     "--k": ["--k", "2"],
     "--level": ["--level", "nan"],
-    "--budget": ["--budget", "-1"],
     "out is a file": ["-o", "unit/a.csv"],
 }
 

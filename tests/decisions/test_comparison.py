@@ -75,17 +75,8 @@ def test_unequal_amplitudes_are_matched_by_prediction_downwards_only():
     (pair,) = result["pairs"]
     (condition,) = pair["conditions"]
     assert condition["predicted"] == ["a"] and condition["amplitude_Nm"] == pytest.approx(0.06)
-    assert "tau1_Nm" in condition["not_compared"] and "absorbed_J" in condition["indicators"]
+    assert not condition["not_compared"] and "absorbed_J" in condition["indicators"]
     assert "beyond the measured" in pair["refused"][0]["reason"]
-
-
-def test_a_prediction_is_less_sure_than_a_measurement():
-    def width(loops):
-        result = compare([evidence("a", loops=loops), evidence("b", loops=((0.05, 0.06),))])
-        ratio = result["pairs"][0]["conditions"][-1]["indicators"]["absorbed_J"]["ratio"]
-        return (ratio["hi"] - ratio["lo"]) / ratio["median"]
-
-    assert width(((0.05, 0.1),)) > 3 * width(((0.05, 0.06),))
 
 
 def test_lost_motion_at_other_torques_is_not_compared():

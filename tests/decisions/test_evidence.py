@@ -1,18 +1,18 @@
 """Evidence is asked by rate and amplitude, survives its files, and says why it cannot answer."""
 
-from dataclasses import replace
+import json
+import shutil
 
 import numpy as np
 import pytest
-from support.bench import unit_of
-from support.decided import CHAINS, DRAWS, KEPT, LOOPS, TYPICAL, evidence, write_evidence
+from support.decided import CHAINS, DRAWS, KEPT, LOOPS, TYPICAL, diagnosis, evidence, write_evidence
+from support.made_posterior import made_fit
 from support_results import write_result
 
-from backdrive_bayes.commands.results import FitOptions, fit_unit, keep_fit
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops, measured_loops
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.indicators.draws import CORE, RESPONSES, UNITS
+from backdrive_bayes.indicators.draws import CORE, UNITS
 
 WITH_SMALL = (*LOOPS, (0.05, 0.04))
 
@@ -52,8 +52,6 @@ def test_values_have_the_draws_of_the_measured_or_the_kept():
     assert e.values("loop_area_J", e.loop(0.05)).shape == (CHAINS * DRAWS,)
     assert e.values("loop_area_J", e.loop(0.05), kept=True).shape == (KEPT,)
     assert e.values("loop_area_J", e.loop(0.05, 0.05)).shape == (KEPT,)
-    with pytest.raises(NotAvailable, match="measured amplitudes only"):
-        e.values("tau1_Nm", e.loop(0.05, 0.05))
 
 
 def test_undefined_is_refused():
@@ -62,46 +60,60 @@ def test_undefined_is_refused():
         e.values("lost_motion_rad", e.loop(0.05))
 
 
-def test_a_result_folder_holds_the_same_evidence(tmp_path):
-    e, again = evidence(seed=4), Evidence.read(write_evidence(tmp_path / "r", seed=4))
-    assert again.name == e.name and again.measured == e.measured and again.converged
-    assert np.array_equal(again.values("loop_area_J", e.loop(0.05)), e.values("loop_area_J", e.loop(0.05)))
-    assert np.array_equal(again.parameters["clearance"], e.parameters["clearance"])
-    assert again.reproduction["seed"] == 7 and again.rated_torque == 0.1
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_evidence(tmp_path_factory.mktemp("made") / "fit", loops=WITH_SMALL, seed=4)
 
 
-def test_a_real_fit_gives_the_same_evidence_in_memory_and_from_its_files(tmp_path):
+def test_evidence_is_the_same_in_memory_and_from_its_files(folder):
     """Loops and prediction, hash and seed included: a verdict does not depend on the way it was come by."""
-    unit = replace(unit_of(amplitudes=(0.1, 0.05)), data_hash="f" * 64)
-    posterior, about = fit_unit(unit, FitOptions(seconds=0.5, seed=3))
-    keep_fit(posterior, about, tmp_path, figures=False)
-    memory, file = Evidence.of(posterior, about), Evidence.read(tmp_path)
-    assert memory.measured == file.measured and len(memory.measured) == 2
+    memory, file = Evidence.of(*made_fit(loops=WITH_SMALL, seed=4)), Evidence.read(folder)
+    assert memory.measured == file.measured and len(memory.measured) == 4 and file.converged
     for name in UNITS:
         loop = memory.loop(0.05)
         assert np.array_equal(memory.values(name, loop), file.values(name, loop)), name
     small = memory.loop(0.05, 0.07)
-    assert small.predicted and np.array_equal(memory.values("loop_area_J", small), file.values("loop_area_J", small))
-    told = memory.reproduction | {"folder": tmp_path.name}
-    assert told == file.reproduction and told["data_sha256"] == "f" * 64 and told["seed"] == 3
-    table = about["records"][0]["indicators"]
+    assert small.predicted and np.array_equal(memory.values("tau1_Nm", small), file.values("tau1_Nm", small))
+    assert np.array_equal(memory.parameters["clearance_rad"], file.parameters["clearance_rad"])
+    told = memory.reproduction | {"folder": folder.name}
+    assert told == file.reproduction and told["seed"] == 4 and file.rated_torque == 0.1
+    table = file.about["records"][1]["indicators"]
     for name in CORE:
-        assert np.median(memory.values(name, memory.loop(0.05))) == pytest.approx(table[name]["median"], rel=1e-5)
-    peak, sensed = RESPONSES.index("theta_L_rad"), [str(n) for n in memory.draws["parameter"].values]
-    assert (memory.draws["sensitivity"].values[:, peak, sensed.index("compliance")] > 0).all()
+        assert np.median(memory.values(name, memory.loop(0.05, 0.1))) == pytest.approx(table[name]["median"], rel=1e-9)
 
 
-def test_folders_that_are_none_are_one_clear_line(tmp_path):
+def test_smaller_loops_are_those_of_the_weights(folder):
+    e = Evidence.read(folder)
+    measured, inside = e.loop(0.05, 0.04), Loop(0.05, 0.04, (1,), True)
+    assert not measured.predicted
+    assert np.median(e.values("loop_area_J", inside)) == pytest.approx(np.median(e.values("loop_area_J", measured)), rel=0.01)
+
+
+def copied(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+def test_folders_that_are_none_are_one_clear_line(folder, tmp_path):
     with pytest.raises(BadInput, match="no such file"):
         Evidence.read(tmp_path)
-    folder = write_evidence(tmp_path / "r")
+    folder = copied(folder, tmp_path)
     (folder / "diagnosis.json").write_text("{")
     with pytest.raises(BadInput, match="diagnosis.json: expected a JSON"):
         Evidence.read(folder)
+    (folder / "diagnosis.json").unlink()
     (folder / "posterior.nc").unlink()
     with pytest.raises(BadInput, match="posterior.nc"):
         Evidence.read(folder)
     write_result(folder, records=1)
-    (folder / "diagnosis.json").unlink()
-    with pytest.raises(BadInput, match="fit the unit again"):
+    with pytest.raises(BadInput, match="posterior.nc: expected"):
+        Evidence.read(folder)
+
+
+@pytest.mark.parametrize("name", ["indicators.json", "diagnosis.json"])
+def test_files_of_other_data_are_refused(folder, tmp_path, name):
+    folder = copied(folder, tmp_path)
+    other = json.loads((folder / "indicators.json").read_text()) if name == "indicators.json" else diagnosis()
+    (folder / name).write_text(json.dumps(other | {"data_sha256": ["f" * 64]}))
+    with pytest.raises(BadInput, match="expected data with SHA-256.*ffffffffffff|expected data with SHA-256 ffffffffffff"):
         Evidence.read(folder)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import binom, norm
+from support.made_posterior import known
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "studies"))
 from acceptance_risk import CONSUMER, PRODUCER, tally, true_indicators  # noqa: E402
@@ -62,9 +63,5 @@ def test_what_did_not_converge_is_inconclusive(measured):
 
 
 def test_true_indicators_know_the_delayed_part():
-    from support.known import reducer, typical_values
-
-    model = reducer()
-    values = typical_values(model)
-    plain, delayed = true_indicators(model, values, False), true_indicators(model, values, True)
+    plain, delayed = (true_indicators(known(), late) for late in (False, True))
     assert delayed["loop_area_J"] > plain["loop_area_J"] and delayed["peak_angle_rad"] > plain["peak_angle_rad"]

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.indicators import indicators as ind
+from backdrive_bayes.indicators.draws import core_indicators
+from backdrive_bayes.indicators.intervals import interval
 from backdrive_bayes.indicators.loop import Loops, torque_grid
-from backdrive_bayes.indicators.summary import core_indicators, interval
 from backdrive_bayes.mechanics.published import PublishedLoop
 
 T, SLOPE = 0.1, np.array([[0.2], [0.35]])

@@ -1,17 +1,12 @@
-"""Simulated records, their blocks, and the exact likelihood of raw samples, for the tests of inference."""
-
-from dataclasses import dataclass
+"""Simulated records, blocks and noise, for the tests of noise and covariance."""
 
 import numpy as np
 from scipy.signal import lfilter
 
-from backdrive_bayes.bench.known_truth import BenchNoise, simulate_unit
-from backdrive_bayes.inference.problem import Problem, RecordData
-from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.bench.known_truth import BenchNoise, physical_reducer, simulate_unit
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.record import Unit
-from backdrive_bayes.records.reduction import Blocks, reduce_record
-from support.known import RATED, reducer, typical_values
+from backdrive_bayes.records.reduction import Blocks
 
 KNOWN_NOISE = BenchNoise()
 
@@ -31,23 +26,10 @@ def known_estimate(noise: BenchNoise, dof=1e9):
     )
 
 
-def unit_of(seed=0, *, z=0.3, rate=0.05, noise=KNOWN_NOISE, amplitudes=(RATED,), **changes) -> Unit:
-    """A simulated unit of the baseline, one record an amplitude; ``changes`` replace values."""
-    model = reducer()
-    values = typical_values(model, z) | changes
-    loops = [(a, rate) for a in amplitudes]
-    return simulate_unit(model, [values] * len(loops), loops, noise, np.random.default_rng(seed))
-
-
-def problem_of(unit, noise: BenchNoise, blocks_per_segment=120, dof=1e9) -> Problem:
-    """The problem of a unit with the noise held at its known values."""
-    estimate, records = known_estimate(noise, dof), []
-    for record in unit.records:
-        segments = find_segments(record.time_s, record.torque_nm)
-        records.append(
-            RecordData.prepare(reduce_record(record, segments, estimate, blocks_per_segment), estimate)
-        )
-    return Problem(reducer(), tuple(records))
+def unit_of(seed=0, *, rate=0.05, noise=KNOWN_NOISE, amplitudes=(0.1,), **changes) -> Unit:
+    """A simulated unit of a known reducer, one record an amplitude; ``changes`` are of the reducer."""
+    known = physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | changes))
+    return simulate_unit(known, [(a, rate) for a in amplitudes], noise, np.random.default_rng(seed))
 
 
 def even_blocks(samples, size, step_s=1e-3) -> Blocks:
@@ -81,49 +63,3 @@ def raw_covariance(samples, step_s, noise: BenchNoise):
     return noise.correlated_rad**2 * np.exp(-lag / noise.correlation_time_s) + noise.white_rad**2 * np.eye(
         samples
     )
-
-
-def kalman_whiten(columns, step_s, noise: BenchNoise):
-    """Standardised innovations (samples, columns) of the exact O(N) state-space form of the raw noise."""
-    phi = np.exp(-step_s / noise.correlation_time_s)
-    state, spread = np.zeros(columns.shape[1]), noise.correlated_rad**2
-    out = np.empty_like(columns)
-    for k, row in enumerate(columns):
-        total = spread + noise.white_rad**2
-        error = row - state
-        out[k] = error / np.sqrt(total)
-        gain = spread / total
-        state = phi * (state + gain * error)
-        spread = phi**2 * spread * (1 - gain) + noise.correlated_rad**2 * (1 - phi**2)
-    return out
-
-
-def without_offset(white, ones):
-    """Whitened columns with the flat-prior offset marginalised."""
-    ones = ones / np.linalg.norm(ones)
-    return white - np.outer(ones, ones @ white)
-
-
-@dataclass(frozen=True)
-class Laplace:
-    """Mode and covariance of the posterior, to state distances in posterior standard deviations."""
-
-    mode: np.ndarray
-    covariance: np.ndarray
-
-    def points(self, rng, n):
-        """Draws (n, dimension) and their coordinates in standard deviations along the principal axes."""
-        value, vector = np.linalg.eigh(self.covariance)
-        unit = rng.standard_normal((n, value.size))
-        return self.mode + (unit * np.sqrt(value)) @ vector.T, unit
-
-
-def quadratic_difference(unit, difference):
-    """Shift of the mode in sd and relative change of the precision that a log-density difference means."""
-    n, d = unit.shape
-    i, j = np.triu_indices(d)
-    design = np.column_stack([np.ones(n), unit, unit[:, i] * unit[:, j]])
-    found = np.linalg.lstsq(design, difference, rcond=None)[0]
-    curvature = np.zeros((d, d))
-    curvature[i, j] = -found[1 + d :]
-    return found[1 : 1 + d], curvature + curvature.T

@@ -1,13 +1,14 @@
 """Evidence made by hand: draws of the indicators of small known units, in memory and as result folders."""
 
 import json
+from dataclasses import dataclass
 
 import numpy as np
-import xarray
-from support_results import GROUP_ATTRIBUTES, indicators
+from support_results import indicators
 
 from backdrive_bayes.decisions.evidence import Evidence
-from backdrive_bayes.indicators.draws import CORE, POSITIONS, RESPONSES, UNITS
+from backdrive_bayes.decisions.loops import same
+from support.made_posterior import made_fit
 
 TYPICAL = {
     "lost_motion_rad": 0.0095,
@@ -31,54 +32,71 @@ LOOPS = ((0.01, 0.1), (0.05, 0.1), (0.1, 0.1))
 CHAINS, DRAWS, KEPT = 4, 500, 400
 
 
+@dataclass(frozen=True, eq=False)
+class Invented:
+    """Draws of indicators by name, (draws, records) each; smaller loops are scaled from the largest of their rate."""
+
+    rates: np.ndarray
+    amplitudes: np.ndarray
+    own: dict
+    parameters: dict
+    small: float = 1.0
+    rated_torque_nm: float = 0.1
+
+    @property
+    def kept(self):
+        return np.linspace(0, CHAINS * DRAWS - 1, KEPT).astype(int)
+
+    def values(self, name, rate, amplitude, kept=False):
+        """Measured loops as they are, others grown from the largest of the rate."""
+        at_rate = [i for i, r in enumerate(self.rates) if same(r, rate, 0.1)]
+        records = [i for i in at_rate if same(self.amplitudes[i], amplitude, 0.02)]
+        factor = 1.0
+        if not records:
+            records = [max(at_rate, key=lambda i: self.amplitudes[i])]
+            share = amplitude / self.amplitudes[records[0]]
+            factor = self.small * (share if name == "peak_angle_rad" else share**2 if name.endswith("_J") else 1.0)
+        found = factor * self.own[name][:, records].mean(axis=1)
+        return found[self.kept] if kept else found
+
+    def width_torques(self, amplitude):
+        """Dense around zero."""
+        return amplitude * np.linspace(-1, 1, 81) ** 3
+
+    def widths(self, rate, amplitude):
+        """A hump at 4 mN·m."""
+        torque = self.width_torques(amplitude)
+        scatter = 1 + 0.01 * np.random.default_rng(3).standard_normal((KEPT, 1))
+        return 0.03 * np.exp(-((np.abs(torque) / 0.004 - 1) ** 2)) * scatter
+
+    def sensitivity(self, response, parameter):
+        """One half."""
+        return np.full(KEPT, 0.5)
+
+
 def evidence(name="u", loops=LOOPS, spread=0.01, seed=0, converged=True, diagnosis=None, k=0.03, effects=(), small=1.0, **means):
     """Evidence with normal draws about ``means`` (typical values by default); a list of means is one a record.
 
     ``small`` scales what loops of smaller amplitude are predicted as; S and absorbed energy grow with the square of it.
     """
-    about = _about(name, loops, converged, k, effects)
-    return Evidence(about, draws(loops, spread, seed, k, small, means), _parameters(seed), diagnosis, name)
-
-
-def draws(loops=LOOPS, spread=0.01, seed=0, k=0.03, small=1.0, means=None):
-    """The group ``indicators`` as a posterior file holds it."""
     rng, n = np.random.default_rng(seed), len(loops)
     rates, amplitudes = (np.array(x) for x in zip(*loops, strict=True))
-    kept = np.linspace(0, CHAINS * DRAWS - 1, KEPT).astype(int)
-    fraction = np.arange(1, POSITIONS + 1) / POSITIONS
-    variables = {}
-    for name, typical in (TYPICAL | (means or {})).items():
-        values = np.broadcast_to(typical, n) * (1 + spread * rng.standard_normal((CHAINS, DRAWS, n)))
-        variables[name] = (("chain", "draw", "record"), values, {"unit": UNITS[name]})
-        if name in CORE:
-            grown = fraction if name == "peak_angle_rad" else fraction**2 if name.endswith("_J") else np.ones(POSITIONS)
-            curve = values.reshape(-1, n)[kept][:, :, None] * (small * grown + (1 - small) * (fraction == 1))
-            variables[f"{name}_by_amplitude"] = (("kept", "record", "position"), curve)
-    torque = np.linspace(-1, 1, 81) ** 3 * amplitudes[:, None]
-    width = 0.03 * np.exp(-((np.abs(torque) / 0.004 - 1) ** 2))
-    names = ["clearance", "compliance", "friction_torque"]
-    variables |= {
-        "position_Nm": (("record", "position"), amplitudes[:, None] * fraction),
-        "width_torque_Nm": (("record", "point"), torque),
-        "width_rad": (("kept", "record", "point"), width * (1 + spread * rng.standard_normal((KEPT, n, 1)))),
-        "model_error_share": (("indicator", "record"), np.full((len(CORE), n), 0.2)),
-        "sensitivity": (("sensed", "response", "parameter"), np.full((20, len(RESPONSES), len(names)), 0.5)),
-        "parameter": (("parameter",), names),
-    }
-    coords = {"kept": kept, "amplitude_Nm": ("record", amplitudes), "loading_rate_Nm_per_s": ("record", rates)}
-    coords |= {"indicator": list(CORE), "response": list(RESPONSES)}
-    return xarray.Dataset(variables, coords, GROUP_ATTRIBUTES | {"k": k, "rated_torque_nm": 0.1})
+    own = {}
+    for key, typical in (TYPICAL | means).items():
+        own[key] = np.broadcast_to(typical, n) * (1 + spread * rng.standard_normal((CHAINS * DRAWS, n)))
+    draws = Invented(rates, amplitudes, own, _parameters(seed), small)
+    return Evidence(_about(name, loops, converged, k, effects), draws, diagnosis, name)
 
 
-def write_evidence(folder, name="u", loops=LOOPS, diagnosis=None, **options):
-    """The same as a result folder of a fit; returns the folder."""
+def write_evidence(folder, name="u", loops=LOOPS, diagnosis=None, converged=True, effects=(), seed=0, size=1.0):
+    """A result folder of a made fit, ``size`` times as large in angle; returns the folder."""
+    from backdrive_bayes.commands.results import keep_fit
+
     folder.mkdir(parents=True, exist_ok=True)
-    made = evidence(name, loops, diagnosis=diagnosis, **options)
-    (folder / "indicators.json").write_text(json.dumps(made.about), encoding="utf-8")
-    shared = {n: (("chain", "draw"), v.reshape(CHAINS, DRAWS)) for n, v in made.parameters.items()}
-    groups = {"posterior": xarray.Dataset(shared, attrs=GROUP_ATTRIBUTES), "indicators": made.draws}
-    for mode, (group, data) in zip("wa", groups.items(), strict=True):
-        data.to_netcdf(folder / "posterior.nc", mode=mode, group=group, engine="h5netcdf")
+    posterior, about = made_fit(name, tuple(loops), seed, size)
+    about["model"]["effects"] = list(effects)
+    about["convergence"] |= {"converged": converged, "advice": "" if converged else "not converged within the budget"}
+    keep_fit(posterior, about, folder, figures=False)
     if diagnosis:
         (folder / "diagnosis.json").write_text(json.dumps(diagnosis), encoding="utf-8")
     return folder
@@ -94,16 +112,17 @@ def diagnosis(answer=(), **which):
 def _about(name, loops, converged, k, effects):
     about = indicators(len(loops)) | {"unit": name, "k": k}
     about["model"] = {"modules": ["geometric", "elastic", "friction"], "effects": list(effects)}
-    advice = "" if converged else "not converged within the budget: give it more time"
+    advice = "" if converged else "not converged within the budget of evaluations: check the records"
     about["convergence"] |= {"converged": converged, "advice": advice}
     for record, (rate, amplitude) in zip(about["records"], loops, strict=True):
         record |= {"loading_rate_Nm_per_s": rate, "amplitude_Nm": amplitude}
         quality = {"r_squared": 0.999, "rms_rad": 3e-4, "rms_high_load_over_rest": 2.0}
-        branches = {"ascending": quality, "descending": quality}
-        record["least_squares"] = {"branches": branches, "indicators": {"loop_area_J": 3.0e-4}}
+        record["least_squares"] = {"branches": {"ascending": quality, "descending": quality}, "indicators": {"loop_area_J": 3e-4}}
     return about
 
 
 def _parameters(seed):
     rng = np.random.default_rng(seed + 1)
-    return {"clearance": 0.03 * np.exp(0.02 * rng.standard_normal(CHAINS * DRAWS))}
+    scatter = np.exp(0.02 * rng.standard_normal((3, CHAINS * DRAWS)))
+    typical = {"clearance_rad": 0.03, "compliance_rated_rad_per_Nm": 0.1, "friction_torque_Nm": 0.003}
+    return {n: v * s for (n, v), s in zip(typical.items(), scatter, strict=True)}

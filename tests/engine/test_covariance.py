@@ -7,8 +7,7 @@ import pytest
 from support.bench import block_means, even_blocks, known_estimate, noise_paths, raw_covariance
 
 from backdrive_bayes.bench.known_truth import BenchNoise
-from backdrive_bayes.inference.covariance import BEND_ERROR, block_covariance, local_slope, whitener
-from backdrive_bayes.inference.problem import RecordData
+from backdrive_bayes.engine.covariance import BEND_ERROR, block_covariance, local_slope, whitener
 from backdrive_bayes.records.reduction import Blocks
 
 NOISE = BenchNoise(white_rad=3e-5, correlated_rad=7e-5, correlation_time_s=0.03)
@@ -111,15 +110,6 @@ def test_whitener_whitens():
     white = whitener(covariance)
     np.testing.assert_allclose(white @ covariance @ white.T, np.eye(CUTS.size - 1), atol=1e-9)
     assert np.array_equal(white, np.tril(white))
-
-
-def test_offset_weights_are_generalised_least_squares():
-    blocks, estimate = uneven_blocks(CUTS), known_estimate(NOISE)
-    data = RecordData.prepare(blocks, estimate)
-    inverse = np.linalg.inv(block_covariance(blocks, estimate))
-    expected = inverse.sum(axis=0) / inverse.sum()
-    np.testing.assert_allclose(data.offset_weight, expected, atol=1e-9)
-    assert data.offset_sd_rad == pytest.approx(inverse.sum() ** -0.5, rel=1e-9)
 
 
 def blocks_at(torque, error=0.0):

@@ -1,0 +1,59 @@
+"""Prediction of torque histories: the known reducer's angle within its interval, honest at the ends of what was measured."""
+
+import numpy as np
+import pytest
+from support.made_posterior import OFFSET, known, made_posterior
+
+from backdrive_bayes.engine import prediction
+from backdrive_bayes.engine.prediction import nodes, predict_angles, require_range
+from backdrive_bayes.errors import BadInput
+
+
+def minor_loops():
+    corner = 0.1 * np.array([0.0, 0.9, 0.3, 0.7, -0.5, 0.2, -0.9, 0.0])
+    time = np.linspace(0, 10, 400)
+    return time, np.interp(time, np.linspace(0, 10, corner.size), corner)
+
+
+def test_from_rest_the_known_angle_lies_within():
+    truth, (time, torque) = known(), minor_loops()
+    curves = predict_angles(made_posterior(truth), time, torque, "rest", 200)
+    expected = truth.angle_rad(time, torque) + OFFSET
+    lo, hi = np.quantile(curves, [0.01, 0.99], axis=0)
+    assert curves.shape == (200, 400) and np.isfinite(curves).all()
+    assert ((expected > lo - 5e-5) & (expected < hi + 5e-5)).all()
+
+
+def test_an_unknown_state_is_wider_until_the_first_large_torque():
+    time, torque = minor_loops()
+    rest, unknown = (predict_angles(made_posterior(), time, torque, s).std(axis=0) for s in ("rest", "unknown"))
+    assert unknown[0] > 10 * rest[0] and unknown[-1] < 1.3 * rest[-1]
+
+
+def test_a_history_that_starts_under_load_and_one_that_rests_are_finite():
+    time = np.linspace(0, 1, 50)
+    for torque in (np.full(50, 0.05), np.linspace(0.05, -0.05, 50), np.zeros(50)):
+        assert np.isfinite(predict_angles(made_posterior(), time, torque)).all()
+
+
+def test_torque_beyond_what_was_measured_needs_leave():
+    posterior = made_posterior()
+    require_range(posterior, [0.101, -0.05], False, "x")
+    with pytest.raises(BadInput, match="up to 0.1 N·m.*--extrapolate goes to 0.12.*found 0.11"):
+        require_range(posterior, [0.11], False, "x")
+    require_range(posterior, [0.11], True, "x")
+    for absurd in (1e6, np.nan):
+        with pytest.raises(BadInput, match="x: expected torques up to"):
+            require_range(posterior, [absurd], True, "x")
+
+
+def test_long_histories_are_evaluated_at_nodes_that_hold_the_turning_points(monkeypatch):
+    monkeypatch.setattr(prediction, "MOST_NODES", 100)
+    time = np.linspace(0, 10, 5001)
+    torque = np.interp(time, [0, 3.3, 5.1, 10], [0, 0.1, -0.1, 0.05])
+    at = nodes(torque)
+    assert at.size < 110 and {int(np.argmax(torque)), int(np.argmin(torque)), 0, 5000} <= set(at.tolist())
+    rough = predict_angles(made_posterior(), time, torque, "rest").mean(axis=0)
+    monkeypatch.setattr(prediction, "MOST_NODES", 10_000)
+    fine = predict_angles(made_posterior(), time, torque, "rest").mean(axis=0)
+    np.testing.assert_allclose(rough, fine[at], atol=1e-12)

@@ -1,0 +1,61 @@
+"""Indicators converge themselves, and a posterior that contradicts the measured cycle is not to be used."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.bench import KNOWN_NOISE
+from support.made_posterior import known, made_posterior
+
+from backdrive_bayes.bench.known_truth import KnownReducer, simulate_unit
+from backdrive_bayes.indicators.convergence import convergence_json, examined
+from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
+
+LOOPS = ((0.05, 0.1), (0.05, 0.04))
+
+
+@pytest.fixture(scope="module")
+def unit():
+    return simulate_unit(known(), [(a, r) for r, a in LOOPS], KNOWN_NOISE, np.random.default_rng(1))
+
+
+def judged(truth, unit, **options):
+    posterior = made_posterior(truth, LOOPS, shape=(4, 250), **options)
+    return examined(IndicatorDraws(posterior, 0.03), unit)
+
+
+def test_the_right_posterior_stands(unit):
+    found = judged(known(), unit)
+    assert found.converged and found.doubts == ()
+    assert len(found.convergence.names) == len(made_posterior().weights) + len(CORE) * len(LOOPS)
+    assert convergence_json(found)["contradictions"] == []
+
+
+@pytest.mark.parametrize(("change", "said"), [({"drag": 0.08}, "loop area S"), ({"compliance": 0.8}, "peak angle")])
+def test_a_wrong_posterior_is_told_with_both_numbers(unit, change, said):
+    found = judged(known(**change), unit)
+    assert not found.converged and any(said in text for text in found.doubts)
+    told = convergence_json(found)
+    assert not told["converged"] and told["advice"].startswith("contradicts the measurement: ")
+    assert "was measured as" in told["advice"] and "inferred as" in told["advice"]
+
+
+def test_width_at_zero_torque_counts_too(unit):
+    truth = known()
+    wide = KnownReducer(truth.weights | {"clearance": 1.2 * truth.weights["clearance"]})
+    assert any("w(0)" in text for text in judged(wide, unit).doubts)
+
+
+def test_what_a_late_channel_adds_is_no_contradiction():
+    truth, lag_s = known(), 0.04
+    unit = simulate_unit(truth, [(a, r) for r, a in LOOPS], KNOWN_NOISE, np.random.default_rng(2))
+    late = tuple(replace(r, angle_rad=np.interp(r.time_s - lag_s, r.time_s, r.angle_rad)) for r in unit.records)
+    unit = replace(unit, records=late)
+    assert judged(truth, unit, lag_s=0.0).doubts and not judged(truth, unit, lag_s=lag_s).doubts
+
+
+def test_ensembles_that_disagree_about_an_indicator_have_not_converged():
+    posterior = made_posterior(loops=LOOPS, shape=(4, 250))
+    posterior.weights["elastic"][1] *= 1.05
+    found = examined(IndicatorDraws(posterior, 0.03))
+    assert not found.converged and np.nanmax(found.convergence.rhat) > 1.05
