@@ -1,0 +1,202 @@
+"""Every registered effect: shapes, levels, and the symmetry that it claims to break."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
+from backdrive_bayes.mechanics import registry
+from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
+from backdrive_bayes.records.reduction import Blocks
+
+TERMS = {t.name: t for terms in registry.LIBRARY.values() for t in terms} | {registry.UNKNOWN.name: registry.UNKNOWN}
+PATHS = [n for n, t in TERMS.items() if isinstance(t, PathEffect)]
+TANGENTS = [n for n, t in TERMS.items() if isinstance(t, TangentEffect)]
+CONTEXT = Context(0.1, 0.02, np.array([0.2, 2.0]), np.array([25.0, 2.5]), 2e-3, 1e-3)
+TURNING = np.array([0.0, 1.0, -1.0, 1.0])
+REDUCER = ReducerClass(np.r_[0.0, np.geomspace(0.01, TOP, 20)])
+
+
+def cycle(sign=1.0, seconds=25.0, points=60):
+    torque = np.concatenate([np.linspace(a, b, points)[:-1] for a, b in zip(TURNING[:-1], TURNING[1:], strict=True)] + [[1.0]])
+    return through(np.linspace(0.0, seconds, torque.size), sign * torque, 1.0)
+
+
+def record(rate, sign=1.0, per_leg=30):
+    """Blocks of 0 → +T → −T → +T at ``rate`` torque scales a second."""
+    edges = [sign * np.linspace(a, b, per_leg + 1) for a, b in zip(TURNING[:-1], TURNING[1:], strict=True)]
+    time = np.r_[0.0, np.cumsum(np.concatenate([np.abs(np.diff(e)) for e in edges]))] / rate
+    torque = np.concatenate([0.5 * (e[1:] + e[:-1]) for e in edges])
+    small, direction = np.zeros(torque.size), (sign * np.array([1, -1, 1])).astype(int)
+    leg = np.repeat([0, 1, 2], per_leg)
+    return Blocks(
+        "r", 0.1 * torque, small, small, time[:-1], time[1:], np.full(torque.size, 9), leg, 0.1 * sign * TURNING, direction, small
+    )
+
+
+def unit(sign=1.0, rates=(0.2, 2.0)):
+    """What designs need of a reduced unit."""
+    blocks, rates = tuple(record(r, sign) for r in rates), np.array(rates)
+    return SimpleNamespace(blocks=blocks, torque_scale_nm=0.1, context=Context(0.1, 0.02, rates, 5.0 / rates, 2e-3, 1e-3))
+
+
+def weights(seed=3):
+    rng = np.random.default_rng(seed)
+    found = {p.name: rng.exponential(size=p.cells.count) for p in REDUCER.parts}
+    return {n: np.linalg.solve(m, w) if (m := REDUCER.part(n).mixing) is not None else w for n, w in found.items()}
+
+
+def column(name, reduced, distortion=None):
+    """The columns that a design holds for one term, by record."""
+    distortion = distortion or Distortion()
+    if isinstance(TERMS[name], PathEffect):
+        return path_group(reduced, TERMS[name]).columns
+    core = class_groups(reduced, REDUCER, distortion)
+    return tangent_groups(reduced, REDUCER, core, distortion, weights(), (TERMS[name],))[0].columns
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_an_effect_says_what_it_is_and_its_trace_is_smaller(name):
+    term = TERMS[name]
+    assert term.breaks and term.signature and term.source and term.unit
+    assert 0 < term.trace(CONTEXT) < 0.5 * term.present(CONTEXT)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_columns_have_their_shapes_and_vanish_with_their_weights(name):
+    for blocks, columns in zip(unit().blocks, column(name, unit()), strict=True):
+        assert columns.shape[0] == blocks.count.size and columns.shape[1] >= 1 and np.isfinite(columns).all()
+        assert np.abs(columns).max() > 0 and not np.any(columns @ np.zeros(columns.shape[1]))
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_responses_join_from_segment_to_segment(name):
+    begin, end = TERMS[name].responses(cycle(), 0, CONTEXT)
+    assert begin.shape == end.shape
+    inner = np.ones(begin.shape[0] - 1, bool)
+    if name == "unknown":
+        inner[[58, 117]] = False
+    np.testing.assert_allclose(begin[1:][inner], end[:-1][inner], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [n for n in TERMS if TERMS[n].breaks == "oddness"])
+def test_what_breaks_oddness_is_even_under_mirrored_torque(name):
+    for here, there in zip(column(name, unit()), column(name, unit(-1.0)), strict=True):
+        # On the first leg a shifted loop also begins elsewhere.
+        np.testing.assert_allclose(there[30:], here[30:], atol=3e-3 * np.abs(here).max())
+
+
+@pytest.mark.parametrize("name", [n for n in TERMS if TERMS[n].breaks == "rate independence"])
+def test_what_breaks_rate_independence_is_odd_and_depends_on_the_rate(name):
+    here, there = column(name, unit()), column(name, unit(-1.0))
+    np.testing.assert_allclose(there[0], -here[0], atol=2e-5 * np.abs(here[0]).max())
+    fast, slow = column(name, unit(rates=(0.2, 2.0))), column(name, unit(rates=(0.2, 0.22)))
+    assert np.abs(fast[1] - slow[1]).max() > 0.05 * max(np.abs(c).max() for c in here)
+
+
+def test_a_wrong_claim_would_be_seen():
+    """A planted fault: lag is not even and an offset is not odd under mirrored torque."""
+    lag, mirrored = column("sensor_lag", unit())[0], column("sensor_lag", unit(-1.0))[0]
+    assert np.abs(mirrored - lag).max() > 0.5 * np.abs(lag).max()
+    offset, mirrored = column("torque_offset", unit())[0], column("torque_offset", unit(-1.0))[0]
+    assert np.abs(mirrored + offset).max() > 0.5 * np.abs(offset).max()
+
+
+def test_drift_depends_on_the_time_alone():
+    drift = TERMS["thermal_drift"]
+    rng = np.random.default_rng(0)
+    history = cycle()
+    other = through(np.r_[history.t0[:1], history.t1], rng.uniform(-1, 1, history.z1.size + 1), 1.0)
+    assert np.array_equal(drift.responses(history, 0, CONTEXT)[1], drift.responses(other, 0, CONTEXT)[1])
+
+
+def test_creep_vanishes_where_the_torque_is_slow_and_holds_where_it_is_fast():
+    creep = TERMS["viscoelastic_creep"]
+    slow, fast = (np.abs(creep.responses(cycle(seconds=s), 0, CONTEXT)[1]).max() for s in (2.5e4, 25.0))
+    assert slow < 0.02 * fast
+
+
+def test_the_lag_grows_with_the_rate_and_exponents_with_its_logarithm():
+    here = column("sensor_lag", unit())
+    np.testing.assert_allclose(here[1][5:25], 10 * here[0][5:25], rtol=0.05, atol=0.02 * np.abs(here[1]).max())
+    for name in ("friction_rate", "drag_rate"):
+        slow, fast = column(name, unit())
+        np.testing.assert_allclose(slow, -fast, atol=0.05 * np.abs(fast).max())
+
+
+def test_what_is_unexplained_adds_to_one_on_every_leg():
+    for response in registry.UNKNOWN.responses(cycle(), 0, CONTEXT):
+        np.testing.assert_allclose(response.sum(axis=1), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_a_record_has_the_same_columns_alone_and_among_others(name):
+    term = TERMS[name]
+    if isinstance(term, PathEffect):
+        both, alone = unit(), SimpleNamespace(**(vars(unit()) | {"blocks": unit().blocks[1:]}))
+        assert np.array_equal(path_group(both, term).columns[1], path_group(alone, term).columns[0])
+    elif name not in ("friction_rate", "drag_rate"):
+        both, alone = column(name, unit()), column(name, unit(rates=(2.0,)))
+        np.testing.assert_allclose(alone[0], both[1], atol=1e-9 * np.abs(both[1]).max())
+
+
+def test_tangents_are_derivatives_of_the_prediction():
+    """Against a difference quotient ten times as wide."""
+    for name in TANGENTS:
+        term, reduced, by = TERMS[name], unit(), weights()
+        step = 10 * term.step
+        curves = [class_groups(reduced, REDUCER, Distortion(**{term.parameter: s * step})).predict(by, list(by)) for s in (1, -1)]
+        for r, columns in enumerate(column(name, reduced)):
+            quotient = (curves[0][r] - curves[1][r]) / (2 * step)
+            # Both on the settled legs: from the first sample on, a shifted history begins elsewhere.
+            away = columns[30:, 0] - quotient[30:]
+            assert np.sqrt(np.mean(away**2)) < 0.05 * np.abs(quotient[30:]).max(), name
+
+
+def test_every_term_is_of_one_known_kind():
+    assert all(isinstance(t, PathEffect | TangentEffect | FlankEffect) for t in TERMS.values())
+    assert all(t.of_reducer is False for n, t in TERMS.items() if n in ("torque_offset", "sensor_lag", "thermal_drift"))
+
+
+@pytest.fixture
+def fresh_registry():
+    registry.all_effects.cache_clear()
+    yield
+    registry.all_effects.cache_clear()
+
+
+class Mine(PathEffect):
+    """An effect of one's own."""
+
+    def trace(self, context):
+        return 1e-4
+
+    def present(self, context):
+        return 1e-2
+
+    def responses(self, history, record, context):
+        return history.z0[:, None] ** 2, history.z1[:, None] ** 2
+
+
+def test_an_effect_of_ones_own_comes_by_entry_point(monkeypatch, fresh_registry):
+    mine = Mine("mine", "oddness", "even", "nobody", "rad")
+    asked = []
+
+    def points(group):
+        asked.append(group)
+        return [SimpleNamespace(load=lambda: mine)]
+
+    monkeypatch.setattr(registry, "entry_points", points)
+    found = registry.all_effects()
+    assert found["mine"] == (mine,) and asked == ["backdrive_bayes.effects"] and set(registry.LIBRARY) < set(found)
+    assert path_group(unit(), found["mine"][0]).columns[0].shape == (90, 1)
+
+
+def test_an_effect_without_levels_is_abstract():
+    bare = Effect("bare", "oddness", "none", "nobody")
+    for method in (bare.trace, bare.present):
+        with pytest.raises(NotImplementedError):
+            method(CONTEXT)

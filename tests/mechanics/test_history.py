@@ -1,0 +1,77 @@
+"""Torque histories behind the blocks of a record: means, turning points, offset and lag."""
+
+import numpy as np
+import pytest
+
+from backdrive_bayes.mechanics.history import PIECES, of_blocks, through
+from backdrive_bayes.records.reduction import Blocks
+
+SCALE, RATE = 0.1, 0.05
+TURNING = np.array([0.0, 0.1, -0.1, 0.1])
+
+
+def ramped(per_leg=7) -> Blocks:
+    """Blocks of 0 → +T → −T → +T at a constant rate."""
+    edges = [np.linspace(a, b, per_leg + 1) for a, b in zip(TURNING[:-1], TURNING[1:], strict=True)]
+    time = np.r_[0.0, np.cumsum(np.concatenate([np.abs(np.diff(e)) for e in edges]))] / RATE
+    torque = np.concatenate([0.5 * (e[1:] + e[:-1]) for e in edges])
+    small = np.zeros(torque.size)
+    return Blocks(
+        "ramp", torque, small, small, time[:-1], time[1:], np.full(torque.size, 50), np.repeat([0, 1, 2], per_leg), TURNING,
+        np.array([1, -1, 1]), small,
+    )  # fmt: skip
+
+
+def middle(history):
+    """Mean torque of every block."""
+    return history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
+
+
+def test_the_mean_torque_of_a_block_is_the_one_that_was_read():
+    blocks = ramped()
+    history = of_blocks(blocks, SCALE)
+    np.testing.assert_allclose(middle(history), blocks.torque_nm / SCALE, atol=1e-12)
+    assert history.z0.size == PIECES * blocks.count.size and history.blocks == blocks.count.size
+
+
+def test_weights_of_a_block_sum_to_one():
+    for lag in (0.0, 0.3):
+        history = of_blocks(ramped(), SCALE, lag_s=lag)
+        np.testing.assert_allclose(np.bincount(history.block, history.weight), 1.0)
+
+
+def test_an_offset_is_added_to_what_was_read():
+    moved, still = of_blocks(ramped(), SCALE, 0.02), of_blocks(ramped(), SCALE)
+    np.testing.assert_allclose(moved.z1 - still.z1, 0.02)
+    assert moved.start == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("lag", [-0.05, 0.05])
+def test_a_late_angle_answers_an_earlier_torque(lag):
+    blocks = ramped()
+    late = middle(of_blocks(blocks, SCALE, lag_s=lag))
+    expected = (blocks.torque_nm - lag * RATE * blocks.direction[blocks.leg]) / SCALE
+    away = np.abs(np.abs(blocks.torque_nm) - 0.1) > 0.02
+    away[0] = False
+    np.testing.assert_allclose(late[away], expected[away], atol=1e-12)
+    assert np.abs(late - blocks.torque_nm / SCALE)[away].min() > 0.02
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.031])
+def test_turning_points_are_kept(lag):
+    history = of_blocks(ramped(), SCALE, lag_s=lag)
+    assert history.z1.max() == pytest.approx(1.0) and history.z1.min() == pytest.approx(-1.0)
+    turned = np.flatnonzero(np.diff(np.sign(history.z1 - history.z0)) != 0)
+    assert np.isin(np.round(history.z1[turned], 12), [1.0, -1.0]).all()
+
+
+def test_segments_join():
+    history = of_blocks(ramped(), SCALE, 0.01, 0.02)
+    assert np.array_equal(history.z0[1:], history.z1[:-1]) and np.array_equal(history.t0[1:], history.t1[:-1])
+    assert np.all(history.t1 > history.t0) and np.all(np.diff(history.block) >= 0)
+
+
+def test_samples_are_blocks_of_their_own():
+    history = through([0.0, 1.0, 3.0], [0.0, 0.1, -0.1], SCALE)
+    np.testing.assert_allclose(middle(history), [0.5, 0.0], atol=1e-15)
+    assert history.start == 0.0 and history.blocks == 2

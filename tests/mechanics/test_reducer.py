@@ -1,0 +1,111 @@
+"""The class: parts, modules, knots, initial states, and columns that are those of its cells."""
+
+import numpy as np
+import pytest
+
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.reducer import BASELINE, INITIAL_THRESHOLDS, TOP, ZONES, ReducerClass, place_knots, spaced
+
+KNOTS = np.r_[0.0, np.geomspace(0.01, TOP, 20)]
+REDUCER = ReducerClass(KNOTS)
+
+
+def ramp(*turning, points=200):
+    torque = np.concatenate([np.linspace(a, b, points) for a, b in zip(turning[:-1], turning[1:], strict=True)])
+    return through(np.arange(torque.size, dtype=float), torque, 1.0)
+
+
+def test_columns_are_linear_in_the_cells():
+    history = ramp(0.0, 1.0, -1.0)
+    columns = REDUCER.columns(history)
+    rng = np.random.default_rng(0)
+    for part in REDUCER.parts:
+        independent = rng.standard_normal(columns[part.name].shape[1])
+        np.testing.assert_allclose(
+            columns[part.name] @ independent, part.cells.means(history) @ part.weights(independent), atol=1e-9
+        )
+
+
+def test_the_prior_of_every_part_has_its_covariance_from_mixing():
+    for part in REDUCER.parts:
+        if part.mixing is not None:
+            assert np.linalg.eigvalsh(part.mixing @ part.mixing.T).min() > 0
+            assert np.array_equal(part.mixing, np.tril(part.mixing))
+
+
+def test_every_part_answers_up_to_full_load():
+    """Read-outs that end below the largest torque made clean loops seem to slip."""
+    history = through(np.arange(4.0), np.array([0.0, -TOP, 0.999, 1.0]), 1.0)
+    for name, ends in REDUCER.ends(history).items():
+        assert np.abs(ends[2] - ends[1]).max() > 1e-5, name
+
+
+@pytest.mark.parametrize("modules", [("elastic",), ("elastic", "friction"), BASELINE])
+def test_modules_choose_the_parts(modules):
+    reducer = ReducerClass(KNOTS, modules)
+    assert {p.module for p in reducer.parts} == set(modules)
+    assert set(reducer.columns(ramp(0.0, 1.0))) == {p.name for p in reducer.parts}
+    initial = reducer.initial_columns(ramp(0.0, 1.0))
+    assert ("initial" in initial) == ("friction" in modules) and ("floating" in initial) == ("geometric" in modules)
+    assert (reducer.part("clearance") is None) == ("geometric" not in modules)
+
+
+@pytest.mark.parametrize("modules", [("friction",), ("elastic", "magic"), ()])
+def test_unknown_modules_and_none_that_is_elastic_are_refused(modules):
+    with pytest.raises(BadInput, match="baseline"):
+        ReducerClass(KNOTS, modules)
+
+
+def test_thresholds_grow_with_the_rate_by_their_exponents():
+    history = ramp(0.0, 1.0, -1.0, 1.0)
+    base, same = REDUCER.columns(history), REDUCER.columns(history, (0.2, 0.2), 0.0)
+    assert all(np.array_equal(base[n], same[n]) for n in base)
+    wider = REDUCER.columns(history, (0.2, 0.0), 1.0)
+    assert not np.allclose(wider["friction"], base["friction"])
+    assert all(np.array_equal(wider[n], base[n]) for n in ("elastic", "clearance", "free_play"))
+    drag = REDUCER.columns(history, (0.0, 0.2), 1.0)
+    assert not np.allclose(drag["clearance"], base["clearance"]) and np.array_equal(drag["friction"], base["friction"])
+
+
+def test_an_initial_state_is_forgotten_once_the_torque_has_been_everywhere():
+    history = ramp(0.0, TOP, -TOP, TOP)
+    for name, columns in REDUCER.initial_columns(history, np.ones(KNOTS.size - 1)).items():
+        assert np.abs(columns[:150]).max() > 0.1, name
+        np.testing.assert_allclose(columns[-190:], 0.0, atol=1e-12)
+
+
+def test_initial_columns_are_those_of_thresholds_and_zones():
+    found = REDUCER.initial_columns(ramp(0.0, 1.0, -1.0))
+    assert found["initial"].shape[1] == 2 * len(INITIAL_THRESHOLDS) and found["floating"].shape[1] == ZONES
+    assert np.isfinite(REDUCER.initial_columns(ramp(0.0, 1.0), np.zeros(KNOTS.size - 1))["floating"]).all()
+
+
+def test_zones_together_are_all_relays_left_up():
+    history, weights = ramp(0.0, 1.0, -1.0), np.linspace(0.5, 2.0, KNOTS.size - 1)
+    cells = REDUCER.part("clearance").cells
+    moved = (cells.means(history, "upper") - cells.means(history)) @ weights
+    np.testing.assert_allclose(REDUCER.initial_columns(history, weights)["floating"].sum(axis=1), moved, atol=1e-12)
+
+
+def test_flanks_that_differ_are_even_in_the_torque():
+    rng = np.random.default_rng(1)
+    weights = {n: rng.standard_normal(c.shape[1]) for n, c in REDUCER.columns(ramp(0.0, 1.0)).items()}
+    here, there = (REDUCER.flank_columns(ramp(0.0, s, -s, s), weights) for s in (1.0, -1.0))
+    np.testing.assert_allclose(there, here, atol=1e-10)
+    ends = REDUCER.flank_columns(ramp(0.0, 1.0), weights, ends=True)
+    assert ends.shape == (199, 4) and np.abs(here).max() > 0.01
+
+
+def test_knots_are_dense_where_blocks_are_and_keep_their_distance():
+    torques = np.r_[np.linspace(-1, 1, 50), np.linspace(0.04, 0.06, 200)]
+    knots = place_knots(torques, 60, 1e-4)
+    assert knots[0] == 0.0 and knots[-1] == TOP and np.all(np.diff(knots) >= 1e-4)
+    inside = np.sum((knots > 0.04) & (knots < 0.06))
+    assert inside > 0.7 * knots.size
+    assert place_knots(torques, 60, 0.01).size < knots.size
+
+
+def test_spaced_keeps_both_ends():
+    found = spaced(np.array([0.0, 0.001, 0.1, 0.15, 0.2, 1.2]), 0.08)
+    np.testing.assert_allclose(found, [0.0, 0.1, 0.2, 1.2])
