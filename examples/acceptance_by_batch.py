@@ -1,6 +1,6 @@
 """Judge a unit with global risks that its sister units tell: limits, a batch of former fits, and the numbers of the verdict.
 
-    python examples/acceptance_by_batch.py [UNIT SISTER SISTER SISTER …] [--limits LIMITS.toml] [--budget SECONDS]
+    python examples/acceptance_by_batch.py [UNIT SISTER SISTER SISTER …] [--limits LIMITS.toml]
 """
 
 from _options import options
@@ -8,7 +8,7 @@ from _options import options
 from backdrive_bayes import accept, fit
 
 given = options("data/reducer-1", out="batch")
-first, *sisters = [fit(unit, seed=1, budget=given.budget) for unit in given.units]
+first, *sisters = [fit(unit, seed=1) for unit in given.units]
 
 verdict = accept(first, given.limits, batch=sisters)
 print(verdict)

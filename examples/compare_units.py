@@ -1,6 +1,6 @@
 """Compare two units, and put the published claims and one of your own to their posteriors.
 
-    python examples/compare_units.py [UNIT UNIT] [--budget SECONDS] [--out OUT]
+    python examples/compare_units.py [UNIT UNIT] [--out OUT]
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ from _options import options
 from backdrive_bayes import compare, fit, report
 
 given = options("data/reducer-1", "data/reducer-2", out="compare-units")
-fits = [fit(unit, seed=1, budget=given.budget) for unit in given.units[:2]]
+fits = [fit(unit, seed=1) for unit in given.units[:2]]
 
 published = compare(*fits, claims="paper")
 for claim in published.claims:

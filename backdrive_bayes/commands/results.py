@@ -121,7 +121,7 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
     hashes = tuple(filter(None, [unit.data_hash]))
     if not sample:
         return stamped(found.json, hashes, options.seed, options.to_json()), None
-    sampled = fit_unit(unit, options, note, getattr(found, "posterior", None))
+    sampled = fit_unit(unit, options, note, found.posterior)
     found.json["convergence"] = sampled[1]["convergence"]
     return stamped(found.json, sampled[0].data_hashes, options.seed, options.to_json()), sampled
 

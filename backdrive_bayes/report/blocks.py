@@ -103,10 +103,35 @@ class Letterhead(Block):
 
 
 @dataclass(frozen=True)
+class About:
+    """What the overview tells of a fitted unit: facts by name, and key indicators (name, unit, text) at one loop."""
+
+    unit: str
+    facts: list[tuple[str, str]]
+    loop: str
+    indicators: list[tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
+class Contents(Block):
+    """The list of contents with page numbers."""
+
+    kind = "contents"
+
+
+@dataclass(frozen=True)
 class Chapter:
-    """What one result contributes: a summary of one page, details, and the figures that its pictures name."""
+    """What one result contributes: a summary of one page, ``pages`` that follow it, details for the appendix, and figures.
+
+    ``outcome`` is its one line on the overview, ``about`` what the overview knows of its unit. A ``provisional`` chapter carries a
+    watermark and is not to be signed.
+    """
 
     title: str
     summary: list[Block]
     details: list[Block]
     figures: dict[str, Any]
+    pages: list[Block] = field(default_factory=list)
+    outcome: str = ""
+    provisional: bool = False
+    about: About | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, record_labels
-from backdrive_bayes.report.blocks import Heading, Note, Paragraph, Table
+from backdrive_bayes.report.blocks import Note, Paragraph, Table
 from backdrive_bayes.report.fit_tables import INDICATORS
 from backdrive_bayes.report.numbers import fixed, interval_text, level_text, like_interval, significant
 
@@ -24,7 +24,7 @@ def least_squares(saved) -> list:
         "intervals; its branches do not close at ±T and constant friction hides in its offset, so its S is "
         "usually too small."
     )
-    return [Heading("Classic least-squares fit"), Paragraph(text), *blocks]
+    return [Paragraph(text), *blocks]
 
 
 def _classic_table(label, record, classic, level):

@@ -18,7 +18,9 @@ def dressed(data: dict, template: CompanyTemplate, room: Path) -> dict:
     if template.logo:
         company["logo"] = template.logo.path.name
         (room / company["logo"]).write_bytes(template.logo.data)
-    return data | {"company": company, "summaries": [_summary(blocks, template) for blocks in data["summaries"]]}
+    overview = _summary(data["overview"], template) if data["overview"] else []
+    chapters = [c | {"summary": _summary(c["summary"], template)} for c in data["chapters"]]
+    return data | {"company": company, "overview": overview, "chapters": chapters}
 
 
 def _summary(blocks, template):

@@ -9,6 +9,7 @@ from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import PER_FIGURE, record_labels, words
 from backdrive_bayes.report import fit_tables as tables
 from backdrive_bayes.report.blocks import (
+    About,
     Banner,
     Block,
     Chapter,
@@ -19,28 +20,33 @@ from backdrive_bayes.report.blocks import (
     Signature,
 )
 from backdrive_bayes.report.classic_tables import least_squares
+from backdrive_bayes.report.findings import findings_blocks, warned
 from backdrive_bayes.report.numbers import fixed, level_text
 from backdrive_bayes.report.parameter_tables import parameters
 from backdrive_bayes.report.text import digests, free
 
 ON_SUMMARY = 2 * PER_FIGURE
 """Records whose indicators fit on the summary page."""
-IN_PLACE = ("loop", "modules", "torque-energy", "corner")
-"""Figures that stand where they are called for; those behind them let text go first and so keep their order."""
+LEFT_OUT = ("predictive",)
+"""Figures that stand in the result folder only."""
+FIRST_ONLY = ("modules", "torque-energy")
+"""Figures of which the report shows the first; those of further records stand in the result folder."""
 
 
 def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``fit`` and lay out its pages."""
     saved = Saved.read(folder)
-    figures = figures_of(saved)
+    figures = {n: f for n, f in figures_of(saved).items() if _shown(n)}
     level = saved.indicators["level"]
-    shown = ["loop"] if len(saved.records) <= PER_FIGURE else []
+    converged = bool(saved.indicators["convergence"]["converged"])
+    shown = ["loop"]
     rest = [name for name in figures if name not in shown]
     return Chapter(
         free(saved.indicators["unit"], 80),
         [
             Heading(free(saved.indicators["unit"], 80), 1),
             _verdict(saved),
+            *findings_blocks(saved.indicators),
             _identity(saved),
             Heading("Key indicators"),
             *tables.indicators(saved, ON_SUMMARY),
@@ -49,7 +55,35 @@ def chapter(folder: Path) -> Chapter:
         ],
         [*(Picture(name, caption(name, level), spilt=True) for name in shown), *_details(saved, rest)],
         figures,
+        outcome=", ".join(filter(None, [_outcome(saved), warned(saved.indicators)])),
+        provisional=not converged,
+        about=_about(saved),
     )
+
+
+def _shown(name):
+    kind = name.rstrip("0123456789").rstrip("-")
+    return kind not in LEFT_OUT and (kind not in FIRST_ONLY or name == kind)
+
+
+def _outcome(saved):
+    records = saved.records
+    state = "converged" if saved.indicators["convergence"]["converged"] else "NOT converged, provisional"
+    return f"{state}; {len(records)} record{'s'[: len(records) != 1]}"
+
+
+def _about(saved) -> About:
+    """Unit, bench and key indicators at the largest loop whose rate is nearest to the default one."""
+    record = saved.records[saved.main_record]
+    identity = saved.indicators.get("identity") or {}
+    told = [(k, str(identity[k])) for k in ON_OVERVIEW if identity.get(k)]
+    rows = [(name, unit, tables.indicator_text(key, record, factor)) for key, name, unit, factor in tables.INDICATORS]
+    loop = f"{record['loading_rate_Nm_per_s']:.2g} N·m/s, ±{record['amplitude_Nm']:.2g} N·m"
+    return About(str(saved.indicators["unit"]), told, loop, rows)
+
+
+ON_OVERVIEW = ("description", "serial", "bench", "operator", "test date", "test_date", "origin")
+"""Keys of a unit's identity that the overview repeats, in this order."""
 
 
 def _verdict(saved):
@@ -95,36 +129,25 @@ def _record_list(records):
 def _details(saved, figures) -> list[Block]:
     level = saved.indicators["level"]
 
-    def pictures(kind):
+    def pictures(kind, floats=False):
         names = [n for n in figures if n == kind or n.startswith(f"{kind}-")]
-        return [Picture(n, caption(n, level), floats=kind not in IN_PLACE) for n in names]
+        return [Picture(n, caption(n, level), floats=floats) for n in names]
 
-    loops, corners = pictures("loop"), pictures("corner")
     more = tables.indicators(saved) if len(saved.records) > ON_SUMMARY else []
-    return [
-        *([Heading("Loops"), *loops] if loops else []),
-        *([Heading("Indicators of all records"), *more] if more else []),
-        Heading("Module decomposition"),
-        *pictures("modules"),
-        *tables.mechanism(saved),
-        Heading("Torque–energy curve"),
-        *pictures("torque-energy"),
-        *tables.humps(saved),
-        *tables.back_drive(saved),
-        Heading("Loops of smaller amplitude"),
-        *pictures("amplitude"),
-        *tables.by_amplitude(saved),
-        Heading("Diagnostics"),
-        *tables.convergence(saved),
-        *pictures("trace"),
-        *pictures("predictive"),
-        Heading("Parameters and priors"),
-        *parameters(saved),
-        *tables.noise(saved),
-        *least_squares(saved),
-        *_reproduction(saved),
-        *([Heading("Pairs of parameters"), *corners] if corners else []),
-    ]
+    parts = (
+        ("Loops of further records", pictures("loop")),
+        ("Indicators of all records", more),
+        ("Module decomposition", [*pictures("modules"), *tables.mechanism(saved)]),
+        ("Torque–energy curve", [*pictures("torque-energy"), *tables.humps(saved)]),
+        ("Back-drive", tables.back_drive(saved)),
+        ("Loops of smaller amplitude", [*pictures("amplitude"), *tables.windows(saved)]),
+        ("Parameters", [*parameters(saved), *pictures("corner")]),
+        ("Sampling", [*tables.convergence(saved), *pictures("trace")]),
+        ("Noise and repeatability", tables.noise(saved)),
+        ("Classic least-squares fit", least_squares(saved)),
+        ("Reproduction", _reproduction(saved)),
+    )
+    return [b for name, blocks in parts if blocks for b in (Heading(name), *blocks)]
 
 
 def _reproduction(saved):
@@ -138,8 +161,4 @@ def _reproduction(saved):
         ("Data, SHA-256", attributes["data_sha256"] or "not recorded"),
         ("Evaluations", f"{saved.indicators['convergence']['evaluations']} of the marginal posterior density"),
     ]
-    return [
-        Heading("Reproduction"),
-        Paragraph("The same data, versions and seed give the same result bit for bit."),
-        Facts(rows),
-    ]
+    return [Paragraph("The same data, versions and seed give the same result bit for bit."), Facts(rows)]

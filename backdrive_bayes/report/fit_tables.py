@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, parts, record_labels, shown_unit, words
-from backdrive_bayes.report.blocks import Heading, Note, Table
+from backdrive_bayes.report.blocks import Note, Table
 from backdrive_bayes.report.numbers import fixed, interval_text, level_text, significant
 from backdrive_bayes.report.text import free
 
@@ -25,7 +25,7 @@ def indicators(saved, at_most: int | None = None) -> list:
     blocks = []
     for part in parts(list(zip(labels, records, strict=False)), PER_FIGURE):
         rows = [
-            [name, unit, *(interval_text(r["indicators"].get(key), factor) for _, r in part)]
+            [name, unit, *(indicator_text(key, r, factor) for _, r in part)]
             for key, name, unit, factor in INDICATORS
         ]
         columns = ["Indicator", "Unit", *(label for label, _ in part)]
@@ -38,6 +38,19 @@ def indicators(saved, at_most: int | None = None) -> list:
         )
     )
     return blocks
+
+
+def indicator_text(key: str, record: dict, factor: float) -> str:
+    """An indicator's interval as text; a ratio of energies ends where it must."""
+    found = record["indicators"].get(key)
+    return ratio_text(found) if key == "dissipation_ratio" else interval_text(found, factor)
+
+
+def ratio_text(interval: dict | None) -> str:
+    """The dissipation ratio u, which lies in [0, 1]: an interval is cut there, and a median beyond is not defined."""
+    if interval is None or not 0.0 <= interval["median"] <= 1.0:
+        return interval_text(None)
+    return interval_text(interval | {"lo": max(interval["lo"], 0.0), "hi": min(interval["hi"], 1.0)})
 
 
 def _by_record(saved, columns, cells):
@@ -73,7 +86,6 @@ def back_drive(saved) -> list:
         return [significant(b["load_Nm"]), angle, energy]
 
     return [
-        Heading("Back-drive"),
         _by_record(saved, ["load τ_L [N·m]", "angle θ_L [arcmin]", "energy W_L [mJ]"], cells),
         Note(
             f"{_interval(saved)} Angle turned and energy absorbed when the load arrives at zero torque on the rising branch of "
@@ -133,12 +145,10 @@ def humps(saved) -> list:
     ]
 
 
-def by_amplitude(saved) -> list:
-    """Extremes and means of S and u: of the loops of amplitude t, and of windows cut out of the measured loop."""
-    loops = _over_positions(saved, "by_amplitude", "Loops of amplitude t", _EXTREMES)
-    windows = _over_positions(saved, "windowed", "Windows |τ| ≤ t", _EXTREMES[2:])
-    about = " Windows are cut out of the measured loop; their u may exceed 1, for they are no closed loops." if windows else ""
-    return [*loops, *windows, Note(f"{_interval(saved)} Over all t up to the amplitude.{about}")]
+def windows(saved) -> list:
+    """Extremes and means of S over windows cut out of the measured loop; nothing where they were not saved."""
+    found = _over_positions(saved, "windowed", "Windows |τ| ≤ t", _WINDOWED)
+    return [*found, Note(f"{_interval(saved)} Windows are cut out of the measured loop, over all t up to the amplitude.")] if found else []
 
 
 def _over_positions(saved, key, title, quantities):
@@ -151,14 +161,7 @@ def _over_positions(saved, key, title, quantities):
 
 
 _HUMP = ("tau1_Nm", "tau2_Nm")
-_EXTREMES = (
-    ("max_S_J", "S max [mJ]", MJ_PER_J),
-    ("min_S_J", "S min [mJ]", MJ_PER_J),
-    ("mean_S_J", "S mean [mJ]", MJ_PER_J),
-    ("max_u", "u max [–]", 1.0),
-    ("min_u", "u min [–]", 1.0),
-    ("mean_u", "u mean [–]", 1.0),
-)
+_WINDOWED = (("max_S_J", "S max [mJ]", MJ_PER_J), ("mean_S_J", "S mean [mJ]", MJ_PER_J))
 
 
 def noise(saved) -> list:
@@ -172,7 +175,6 @@ def noise(saved) -> list:
     jitter = saved.indicators["jitter"]
     size, length = (significant(jitter[k], 2, 1e3) for k in ("torque_Nm", "length_Nm"))
     return [
-        Heading("Noise and repeatability"),
         _by_record(
             saved, ["white [arcmin]", "correlated [arcmin]", "corr. time [ms]", "torque [mN·m]"], cells
         ),

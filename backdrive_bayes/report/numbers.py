@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 
 MOST_DECIMALS = 8
 UNDEFINED = "not defined"
-_LOG_NORMAL = re.compile(r"log-normal, median (\S+), log-sd ([^\s,]+)(?:, below (\S+))?")
-_UNIFORM = re.compile(r"((?:log-)?uniform) on \[(\S+), (\S+)\]")
-_NORMAL = re.compile(r"normal, mean 0, sd (\S+)")
 
 
 def decimals(spread: float, value: float) -> int:
@@ -61,11 +57,6 @@ def significant(value: float | None, digits: int = 3, factor: float = 1.0) -> st
     return _fixed(value, max(0, digits - 1 - power))
 
 
-def percent(share: float | None) -> str:
-    """A share as per cent."""
-    return "–" if share is None else f"{100 * share:.3g} %" if share < 0.01 else f"{100 * share:.0f} %"
-
-
 def probability_text(probability: float | None) -> str:
     """A probability with two decimals, three near 0 and 1, never rounded to certainty."""
     if probability is None:
@@ -78,21 +69,6 @@ def probability_text(probability: float | None) -> str:
 def level_text(level: float) -> str:
     """The level of intervals as per cent."""
     return f"{100 * level:.3g} %"
-
-
-def prior_text(prior: str, factor: float) -> str:
-    """A prior's description with its scale in the display unit; left as it is where it is of a kind not known
-    here.
-    """
-    if found := _LOG_NORMAL.fullmatch(prior):
-        below = f", below {factor * float(found[3]):.4g}" if found[3] else ""
-        return f"log-normal, median {factor * float(found[1]):.4g}, log-sd {found[2]}{below}"
-    if found := _UNIFORM.fullmatch(prior):
-        lo, hi = (f"{factor * float(v):.4g}".replace("-", "−") for v in found.groups()[1:])
-        return f"{found[1]} on [{lo}, {hi}]"
-    if found := _NORMAL.fullmatch(prior):
-        return f"normal, mean 0, sd {factor * float(found[1]):.4g}"
-    return prior if factor == 1.0 else f"{prior} (SI units)"
 
 
 def _fixed(value: float, n: int) -> str:

@@ -51,13 +51,15 @@ def compile_report(folders: list[Path], template: CompanyTemplate | None = None,
     """What Typst makes of the report with the given output options (bytes, or a list of bytes for images)."""
     typst = _typst()
     from backdrive_bayes.report.sections import chapters
+    from backdrive_bayes.report.written import written_on
 
     if template and template.logo:
         refuse_undrawable(template.logo, typst)
     found = [c for folder in folders for c in chapters(folder)]
     with tempfile.TemporaryDirectory() as name:
         room = Path(name)
-        data = _data(found, room, template.title if template and template.title else TITLE)
+        title = template.title if template and template.title else TITLE
+        data = _data(found, room, title, written_on(folders))
         data, fonts = _fit_to_fonts(dressed(data, template, room) if template else data, typst)
         (room / "data.json").write_text(json.dumps(data), encoding="utf-8")
         for layout in _LAYOUT:
@@ -74,29 +76,30 @@ def _typst():
     return typst
 
 
-def _data(found, room: Path, title: str) -> dict:
+def _data(found, room: Path, title: str, written: str) -> dict:
     """Everything that the template prints; figures are written into ``room``."""
     from backdrive_bayes.report.blocks import Heading
     from backdrive_bayes.report.method_text import method_blocks
+    from backdrive_bayes.report.overview import overview_blocks
 
-    def placed(part):
-        return [[_placed(b.data(), c, i, room) for b in getattr(c, part)] for i, c in enumerate(found)]
+    def placed(chapter, i):
+        parts = {n: [_placed(b.data(), chapter, i, room) for b in getattr(chapter, n)] for n in ("summary", "pages", "details")}
+        if len(found) > 1 and parts["details"]:
+            parts["details"].insert(0, Heading(free(f"Appendix: {chapter.title}", 110), 1).data())
+        # Nobody signs what is provisional.
+        unsigned = [b for b in parts["summary"] if b["kind"] != "signature"]
+        return parts | {"provisional": chapter.provisional} | ({"summary": unsigned} if chapter.provisional else {})
 
-    details = placed("details")
-    if len(found) > 1:
-        details = [[Heading(c.title, 1).data(), *blocks] for c, blocks in zip(found, details, strict=True)]
     names = [c.title for c in found]
     shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
-    title = free(f"{title}: {shown}", 160)
-    method = [b.data() for b in method_blocks()]
-    author = f"backdrive-bayes {version('backdrive-bayes')}"
+    full = free(f"{title}: {shown}", 160)
     return {
-        "title": title,
-        "running": free(title, 90),
-        "author": author,
-        "summaries": placed("summary"),
-        "details": details,
-        "method": method,
+        "title": full,
+        "running": free(full, 90),
+        "author": f"backdrive-bayes {version('backdrive-bayes')}",
+        "overview": [b.data() for b in overview_blocks(found, title, written)] if len(found) > 1 else [],
+        "chapters": [placed(c, i) for i, c in enumerate(found)],
+        "method": [b.data() for b in method_blocks()],
     }
 
 

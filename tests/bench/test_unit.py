@@ -47,7 +47,7 @@ def test_the_bench_shares_no_code_with_model_and_inference():
     for path in files:
         assert not foreign_imports(path.read_text(encoding="utf-8")), path
         assert "known_truth" not in path.read_text(encoding="utf-8"), path
-    assert foreign_imports("from backdrive_bayes.model.play import play")
+    assert foreign_imports("from backdrive_bayes.engine.infer import infer")
 
 
 def test_the_bench_loads_neither_model_nor_inference():

@@ -12,11 +12,11 @@ import pytest
 import xarray
 from support_results import write_result
 
+from backdrive_bayes.engine.parameters import PARAMETERS
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.figures import catalogue, loop
 from backdrive_bayes.figures.saved import Saved, record_blocks
 from backdrive_bayes.figures.style import drawn_words, in_words, numbers, parts, record_labels, styled, words
-from backdrive_bayes.model.registry import BASELINE, candidates_beside, members_named
 
 NAMES = ["loop", "modules", "torque-energy", "amplitude", "corner", "trace", "predictive"]
 
@@ -109,14 +109,15 @@ SIZES = {"rad": 3.1e-8, "rad/(N·m)": 2.21234567, "N·m": 0.0045, "1": 0.4998765
 def crowded(tmp_path_factory):
     """All that a diagnosed model may hold: every parameter and module there is, in six records of one rate."""
     path = tmp_path_factory.mktemp("crowded")
-    members = members_named((*BASELINE, *candidates_beside(BASELINE)))
-    shared = {p.name: (p.unit, SIZES[p.unit]) for m in members for p in m.parameters if not p.per_record}
+    shared = {p.name: (p.unit, SIZES[p.unit]) for p in PARAMETERS}
+    shared |= {f"log_scale_of_{i}_{words}": ("1", 0.4) for i, words in enumerate(["thermal_drift", "friction", "elastic"] * 8)}
     result = write_result(path, records=6, shared=shared)
     for i, record in enumerate(result["records"]):
         record["loading_rate_Nm_per_s"] = 0.05
         elastic = record["modules"]["elastic"]
         small = {k: [1e-3 * v for v in values] for k, values in elastic.items()}
-        record["modules"] = {m.name: elastic if j < 2 else small for j, m in enumerate(members[: 13 if i == 0 else 4])}
+        names = [f"module_{j}" for j in range(13 if i == 0 else 4)]
+        record["modules"] = {name: elastic if j < 2 else small for j, name in enumerate(names)}
     (path / "indicators.json").write_text(json.dumps(result))
     return path, list(shared), catalogue.all_figures(path)
 

@@ -1,1 +1,0 @@
-"""From records and model to a posterior: likelihood, mode, discrepancy, sampling, files."""

@@ -1,1 +1,0 @@
-"""The reducer model: parameters, play operators, modules and their registry."""

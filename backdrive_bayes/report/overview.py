@@ -1,0 +1,49 @@
+"""The first page of a report on several results: what is inside and how each came out."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+from backdrive_bayes.report.blocks import Block, Chapter, Contents, Facts, Heading, Note, Table
+from backdrive_bayes.report.text import free
+
+MOST_UNITS = 3
+"""Units beside each other in the table of key indicators."""
+MOST_FACTS = 6
+
+
+def overview_blocks(chapters: list[Chapter], title: str, written: str) -> list[Block]:
+    """Date, units, outcomes, key indicators and contents of the report's chapters."""
+    units = {c.about.unit: c.about for c in chapters if c.about}
+    facts = [("Results of", written), ("Software", f"backdrive-bayes {version('backdrive-bayes')}")]
+    facts += [(name, text) for name, text in _units(units.values())][:MOST_FACTS]
+    rows = [[free(c.title, 60), c.outcome or "–"] for c in chapters]
+    return [
+        Heading(free(title, 90), 1),
+        Facts(facts),
+        Heading("Results"),
+        Table(["Result", "Outcome"], rows, [1.0, 2.6]),
+        *_key_indicators(list(units.values())[:MOST_UNITS]),
+        Heading("Contents"),
+        Contents(),
+    ]
+
+
+def _units(units):
+    for about in units:
+        yield free(about.unit, 24), free("; ".join(f"{value}" for _, value in about.facts) or "no description", 220)
+
+
+def _key_indicators(units) -> list[Block]:
+    """One column a unit; nothing where no unit was fitted."""
+    if not units:
+        return []
+    values = [{name: text for name, _, text in u.indicators} for u in units]
+    rows = [[name, unit, *(v.get(name, "–") for v in values)] for name, unit, _ in units[0].indicators]
+    loops = "; ".join(f"{free(u.unit, 24)}: {u.loop}" for u in units)
+    columns = ["Indicator", "Unit", *(free(u.unit, 24) for u in units)]
+    return [
+        Heading("Key indicators"),
+        Table(columns, rows, [1.6, 0, *[1.4] * len(units)]),
+        Note(f"Median and credible interval of the settled loop. {loops}."),
+    ]
