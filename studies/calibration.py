@@ -1,10 +1,10 @@
-"""Coverage and simulation-based calibration on units drawn from the prior.
+"""Coverage and simulation-based calibration on units near the physical family.
 
     python studies/calibration.py --units 120 --out reports/calibration
 
-Every unit's parameters are drawn from the prior, its records simulated with correlated and white angle noise and torque noise,
-and fitted with fresh seeds. Written: calibration.json (coverage of the 90 % intervals with binomial bounds, SBC ranks and the
-p-value of their uniformity) and ranks.png.
+Every unit's parameters are drawn about the usual ones, its records simulated with correlated and white angle noise and torque
+noise, and fitted with fresh seeds. Written: calibration.json (coverage of the 90 % intervals with binomial bounds, SBC ranks and
+the p-value of their uniformity) and ranks.png.
 """
 
 from __future__ import annotations
@@ -22,65 +22,50 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import binom, chisquare
 
-from backdrive_bayes.bench.known_truth import BenchNoise, simulate_unit
-from backdrive_bayes.indicators.loop import Loops, model_loops, torque_grid
-from backdrive_bayes.indicators.summary import core_indicators, monitored, reducer_loops
-from backdrive_bayes.inference.fit import fit
-from backdrive_bayes.inference.sampling import Settings
-from backdrive_bayes.model.parameter import Scale
-from backdrive_bayes.model.reducer import ReducerModel
-from backdrive_bayes.model.registry import BASELINE, members_named
+from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, random_reducer, simulate_unit
+from backdrive_bayes.commands.results import FitOptions, fit_unit
+from backdrive_bayes.engine.parameters import Operator, parameters_of
+from backdrive_bayes.indicators.draws import CORE, IndicatorDraws, core_indicators
+from backdrive_bayes.indicators.loop import cut_loops, torque_grid
 
 RATED = 0.1
-SCALE = Scale(RATED, 0.02)
 LOOPS = ((0.1, 0.05), (0.05, 0.05))
 K = 0.03
 RANKS = 99
 
 
-def one_unit(seed: int, budget: float = 120.0, noise_factor: float = 1.0) -> dict:
+def one_unit(seed: int, noise_factor: float = 1.0) -> dict:
     """Fit one simulated unit; ranks of the truth among thinned draws, whether 90 % intervals hold it, convergence."""
     rng = np.random.default_rng([20261121, seed])
-    model = ReducerModel(members_named(BASELINE), SCALE)
-    shared = {p.name: p.scaled_prior(SCALE).from_normal(rng.normal()) for p in model.parameters if not p.per_record}
-    values = []
-    for _ in LOOPS:
-        own = {p.name: p.scaled_prior(SCALE).from_normal(rng.normal()) for p in model.parameters if p.per_record}
-        values.append(shared | own)
-    unit = simulate_unit(model, values, LOOPS, BenchNoise(), rng)
+    known = random_reducer(rng)
+    unit = simulate_unit(known, LOOPS, BenchNoise(), rng)
     began = time.perf_counter()
-    posterior = fit(unit, seed=seed, scale=SCALE, settings=Settings(max_seconds=budget), quantities=monitored(K))
+    posterior, _ = fit_unit(unit, FitOptions(k=K, seed=seed))
     result = {"seed": seed, "converged": posterior.converged, "seconds": time.perf_counter() - began, "quantities": {}}
-    physical = posterior.problem.physical(posterior.z)
-    truths = [shared.get(c.parameter.name, None) if c.record is None else values[c.record][c.parameter.name]
-              for c in posterior.problem.coordinates]
-    for label, truth, draws in zip(posterior.problem.labels, truths, physical.T, strict=True):
-        result["quantities"][label] = place(truth, draws, noise_factor)
-    for r, v in enumerate(values):
-        true = true_indicators(model, v, LOOPS[r][0])
-        loops = reducer_loops(posterior.problem, posterior.discrepancy, posterior.z, posterior.weights, r, K)
-        for name, draws in core_indicators(loops, K * RATED).items():
-            result["quantities"][f"{name}[{r}]"] = place(true[name], draws, noise_factor)
-    result["discrepancy_rad"] = posterior.discrepancy.scale_rad
-    result["truth"] = {k: float(v) for k, v in shared.items()}
+    truths, draws = true_parameters(known), IndicatorDraws(posterior, K)
+    for name, values in draws.parameters.items():
+        result["quantities"][name] = place(truths[name], values, noise_factor)
+    for r, (amplitude, _) in enumerate(LOOPS):
+        true = true_indicators(known, amplitude)
+        for name in CORE:
+            values = draws.values(name, draws.rates[r], draws.amplitudes[r])
+            result["quantities"][f"{name}[{r}]"] = place(true[name], values, noise_factor)
     return result
 
 
-def true_indicators(model, values, amplitude) -> dict:
+def true_parameters(known: KnownReducer) -> dict:
+    """The user's parameters of the known reducer."""
+    weights = {name: w[None] for name, w in known.weights.items()}
+    operator = Operator(known.reducer, weights, known.torque_scale_nm, known.angle_scale_rad, 1.0)
+    return {name: float(v[0]) for name, v in parameters_of(operator).items()}
+
+
+def true_indicators(known: KnownReducer, amplitude) -> dict:
     """Noise-free indicators of the settled loop."""
-    torque = torque_grid(amplitude, (K * RATED,))
-
-    class Known:
-        def __init__(self):
-            self.model = model
-
-        def values(self, z, record):
-            return {k: np.array([[v]]) for k, v in values.items()}
-
-        def loading_rate_nm_per_s(self, record):
-            return 1.0
-
-    loops: Loops = model_loops(Known(), np.zeros((1, 1)), 0, torque)
+    torque = torque_grid(amplitude, (K * RATED, *known.reducer.knots * RATED))
+    whole = amplitude * np.array([0.0, 1.0, -1.0, 1.0])
+    whole = np.r_[whole, torque[::-1][1:], torque[1:]]
+    loops = cut_loops(torque, known.angle_rad(np.arange(whole.size, dtype=float), whole)[None])
     return {k: float(v[0]) for k, v in core_indicators(loops, K * RATED).items()}
 
 

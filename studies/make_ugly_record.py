@@ -13,20 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise
-from backdrive_bayes.model.parameter import Scale
-from backdrive_bayes.model.path import TorquePath
-from backdrive_bayes.model.reducer import ReducerModel
-from backdrive_bayes.model.registry import BASELINE, members_named
+from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, angle_noise, physical_reducer
 
-TRUTH = {
-    "clearance": 0.012, "drag_torque": 0.05, "engagement_torque": 0.02, "release_share": 0.1, "release_torque": 0.03,
-    "release_width_ratio": 1.0, "late_share": 0.0, "late_drag_ratio": 1.0, "late_width_ratio": 1.0,
-    "initial_gap_position": 0.3, "initial_gap_spread": 0.0, "compliance": 0.012, "hardening_ratio": 0.6, "hardening_torque": 0.8,
-    "friction_torque": 0.06, "friction_ratio": 0.05, "friction_spread": 0.5, "load_spread": 0.5, "free_share": 0.2,
-    "initial_friction_state": -0.5,
-}
-RATED = 2.0
+RATED, ANGLE = 2.0, 0.02
 
 
 def main():
@@ -37,8 +26,8 @@ def main():
     corner = np.concatenate([[0.0], np.cumsum(np.where(rest, 0.3, np.abs(np.diff(knots)) / 0.5))])
     time = np.arange(0.0, corner[-1], 0.002)
     torque = np.interp(time, corner, knots)
-    model = ReducerModel(members_named(BASELINE), Scale(RATED, 0.02))
-    angle = model.angle({k: np.array([v]) for k, v in TRUTH.items()}, TorquePath.from_samples(torque, time))
+    known = physical_reducer(rng, clearance=0.6, drag=0.03, engagement=0.3, compliance=0.6, friction=0.4, threshold=0.04)
+    angle = KnownReducer(known.weights, RATED, ANGLE).angle_rad(time, torque)
     angle = angle + angle_noise(time.size, 0.002, BenchNoise(3e-5, 8e-5), rng) + 0.2
     measured = torque + 0.01 * rng.standard_normal(time.size) + 0.004 * np.sin(2 * np.pi * 11 * time)
     frozen = (time > 12.0) & (time < 12.06)

@@ -13,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
 import json
+import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -20,57 +21,43 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.indicators.summary import indicators_json, monitored
-from backdrive_bayes.inference.fit import fit
-from backdrive_bayes.inference.posterior_file import write_posterior
-from backdrive_bayes.inference.predict import predict_angles
-from backdrive_bayes.inference.sampling import Settings
+from backdrive_bayes.commands.results import FitOptions, fit_unit
+from backdrive_bayes.engine.parameters import posterior_parameters
+from backdrive_bayes.engine.prediction import nodes, predict_angles
 from backdrive_bayes.records.history import noise_free_torque
 from backdrive_bayes.records.unit_folder import read_unit
 
 K = 0.03
+PARAMETERS = ("clearance_rad", "friction_torque_Nm", "load_friction_ratio")
 CREDIT = "github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0"
 
 
 def study_unit(job) -> dict:
     """Fit all loops, then the large ones alone, and predict the small ones from those."""
     warnings.simplefilter("ignore")
-    folder, out, budget = job
-    unit = read_unit(folder)
-    settings = Settings(max_seconds=budget)
-    posterior = fit(unit, seed=1, settings=settings, quantities=monitored(K))
-    result = {"unit": unit.name, "all": _brief(posterior)}
-    draws = {}
-    for name in ("clearance", "friction_torque", "friction_ratio", "drag_torque"):
-        i = posterior.problem.labels.index(name)
-        draws[name] = posterior.problem.physical(posterior.z)[::4, i].tolist()
-    indicators = indicators_json(posterior, K)
+    began, unit = time.perf_counter(), read_unit(job)
+    posterior, indicators = fit_unit(unit, FitOptions(k=K, seed=1))
+    result = {"unit": unit.name, "all": indicators["convergence"], "seconds": round(time.perf_counter() - began, 1)}
+    parameters = posterior_parameters(posterior)
     result["indicators"] = [{"file": r["file"], **r["indicators"]} for r in indicators["records"]]
-    result["draws"] = draws
+    result["draws"] = {name: parameters[name].tolist() for name in PARAMETERS}
     large = replace(unit, records=tuple(r for r in unit.records if r.name.startswith("large")))
-    alone = fit(large, seed=2, settings=settings, quantities=monitored(K))
-    result["large_only"] = _brief(alone)
-    path = out / f"{unit.name}.nc"
-    write_posterior(alone, path)
-    result["small_predicted"] = _predict_small(unit, alone, path)
-    path.unlink()
+    alone, about = fit_unit(large, FitOptions(k=K, seed=2))
+    result["large_only"] = about["convergence"]
+    result["small_predicted"] = _predict_small(unit, alone)
     return result
 
 
-def _brief(posterior):
-    return posterior.convergence.to_json() | {"discrepancy_rad": posterior.discrepancy.scale_rad}
-
-
-def _predict_small(unit, posterior, path):
+def _predict_small(unit, posterior):
     if not posterior.converged:
         return None
     hits, total, width, gap = 0, 0, [], []
     for record in (r for r in unit.records if r.name.startswith("small")):
         pick = slice(None, None, 4)
         torque, _ = noise_free_torque(record.time_s[pick], record.torque_nm[pick])
-        curves = predict_angles(path, record.time_s[pick], torque, rng=np.random.default_rng(3))
+        curves = predict_angles(posterior, record.time_s[pick], torque)
         lo, hi = np.quantile(curves, [0.05, 0.95], axis=0)
-        measured = record.angle_rad[pick]
+        measured = record.angle_rad[pick][nodes(torque)]
         hits += int(np.sum((measured >= lo) & (measured <= hi)))
         total += measured.size
         width.append(float(np.mean(hi - lo)))
@@ -88,7 +75,7 @@ def trends(results) -> list[dict]:
                 rows.append({"from": low, "to": high, "inconclusive": "one of the two has not converged"})
                 continue
             row = {"from": low, "to": high}
-            for name, sign in (("clearance", -1), ("friction_torque", 1), ("friction_ratio", 1)):
+            for name, sign in zip(PARAMETERS, (-1, 1, 1), strict=True):
                 a, b = (np.array(by_name[u]["draws"][name]) for u in (low, high))
                 n = min(a.size, b.size)
                 row[f"P({name} {'rises' if sign > 0 else 'falls'})"] = float(np.mean(sign * (b[:n] - a[:n]) > 0))
@@ -110,17 +97,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/cycloidal"))
     parser.add_argument("--out", type=Path, default=Path("reports/real-loops"))
-    parser.add_argument("--budget", type=float, default=200.0)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     folders = sorted(p.parent for p in options.data.glob("*/unit.toml"))
     results = []
     with ProcessPoolExecutor(options.workers) as pool:
-        for result in pool.map(study_unit, [(f, options.out, options.budget) for f in folders]):
+        for result in pool.map(study_unit, folders):
             results.append(result)
-            print(result["unit"], {k: result["all"][k] for k in ("converged", "max_rhat", "min_tail_ess", "seconds")},
-                  "large only", result["large_only"]["converged"], "small predicted", result["small_predicted"], flush=True)
+            state = {k: result["all"][k] for k in ("converged", "max_rhat", "min_tail_ess", "contradictions")}
+            print(result["unit"], state, result["seconds"], "s, large only", result["large_only"]["converged"], flush=True)
+            print("  small predicted", result["small_predicted"], flush=True)
             # Kept unit by unit: the whole takes long.
             kept = [{k: v for k, v in r.items() if k != "draws"} for r in results]
             (options.out / "real_loops.json").write_text(json.dumps({"credit": CREDIT, "units": kept, "trends": []}, indent=1))

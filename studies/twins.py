@@ -16,9 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.indicators.summary import indicators_json, monitored
-from backdrive_bayes.inference.fit import fit
-from backdrive_bayes.inference.sampling import Settings
+from backdrive_bayes.commands.results import FitOptions, fit_unit
 from backdrive_bayes.records.unit_folder import read_unit
 
 ARCMIN = np.pi / 10800
@@ -52,13 +50,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/twins"))
     parser.add_argument("--out", type=Path, default=Path("reports/twins"))
-    parser.add_argument("--budget", type=float, default=300.0)
     options = parser.parse_args()
     rows = []
     for name in ANSWERS:
-        settings = Settings(max_seconds=options.budget)
-        posterior = fit(read_unit(options.data / name), seed=1, quantities=monitored(0.03), settings=settings)
-        result = indicators_json(posterior, 0.03)
+        posterior, result = fit_unit(read_unit(options.data / name), FitOptions(seed=1))
         for record in result["records"]:
             for indicator, truth, factor in expected(name, record):
                 v = record["indicators"][indicator]

@@ -17,6 +17,8 @@ NEAR_ZERO, NEAR_RATED = 0.15, 0.85
 """Compliances are secants of the settled loading branch up to the first, and from the second up to T_r."""
 SMALL_CENTRE = 0.28
 """Friction torque is that of plays whose read-out lies below this share of the largest torque."""
+LEAST_SUM = 0.1
+"""Share of the sum of magnitudes below which weights nearly cancel and weighted means mean nothing."""
 TINY = 1e-300
 
 
@@ -41,10 +43,10 @@ class Operator:
         end = min(1.0, posterior.rated_torque_nm / context.torque_scale_nm)
         return cls(posterior.reducer, weights, context.torque_scale_nm, context.angle_scale_rad, end)
 
-    def positive(self, part: str, chosen) -> np.ndarray:
-        """Angles that the chosen cells of a part contribute, negative ones taken as zero, (draws, chosen)."""
+    def angles(self, part: str, chosen) -> np.ndarray:
+        """Angles that the chosen cells of a part contribute, (draws, chosen)."""
         cells = self.reducer.part(part).cells
-        return np.maximum(self.weights[part][:, chosen], 0.0) * (cells.width / cells.norm)[chosen]
+        return self.weights[part][:, chosen] * (cells.width / cells.norm)[chosen]
 
     def loading_slope(self, parts: tuple[str, ...], low: float, high: float) -> np.ndarray:
         """Secant of the settled loading branch of some parts between two shares of the largest torque [rad/(N·m)], (draws,)."""
@@ -86,10 +88,8 @@ def _crossing(op: Operator) -> tuple[np.ndarray, np.ndarray]:
     low = _low(op, "clearance")
     cells = op.reducer.part("clearance").cells
     middle, width = (cells.up + 0.5 * cells.width)[low], cells.width[low]
-    angle = op.positive("clearance", low)
-    mean, spread = _moments(angle, middle)
-    within = angle @ (width**2 / 12.0) / np.maximum(angle.sum(axis=1), TINY)
-    return mean * op.torque_scale_nm, np.sqrt(spread**2 + within) * op.torque_scale_nm
+    mean, spread = _moments(op.angles("clearance", low), middle, width**2 / 12.0)
+    return mean * op.torque_scale_nm, spread * op.torque_scale_nm
 
 
 def _hardening(op: Operator) -> np.ndarray:
@@ -112,28 +112,37 @@ def _near(op: Operator) -> np.ndarray:
 
 def _friction_torque(op: Operator) -> np.ndarray:
     near = _near(op)
-    return _moments(op.positive("friction", near), op.reducer.part("friction").cells.threshold[near])[0] * op.torque_scale_nm
+    return _moments(op.angles("friction", near), op.reducer.part("friction").cells.threshold[near])[0] * op.torque_scale_nm
 
 
 def _friction_spread(op: Operator) -> np.ndarray:
     near = _near(op)
-    return _moments(op.positive("friction", near), np.log(op.reducer.part("friction").cells.threshold[near]))[1]
+    return _moments(op.angles("friction", near), np.log(op.reducer.part("friction").cells.threshold[near]))[1]
 
 
 def _load_ratio(op: Operator) -> np.ndarray:
     cells = op.reducer.part("friction").cells
-    angle = op.positive("friction", np.ones(cells.count, bool))
-    total = np.maximum(angle.sum(axis=1), TINY)
-    centre = cells.centre - (angle @ cells.centre / total)[:, None]
-    threshold = cells.threshold - (angle @ cells.threshold / total)[:, None]
-    return np.sum(angle * centre * threshold, axis=1) / np.maximum(np.sum(angle * centre**2, axis=1), TINY)
+    angle = op.angles("friction", np.ones(cells.count, bool))
+    centre, threshold = (v - _moments(angle, v)[0][:, None] for v in (cells.centre, cells.threshold))
+    square = angle * centre**2
+    return np.sum(angle * centre * threshold, axis=1) / _safe_sum(square)
 
 
-def _moments(angle, value):
-    """Mean and standard deviation of ``value`` (cells,) weighted by ``angle`` (draws, cells), (draws,) each."""
-    total = np.maximum(angle.sum(axis=1), TINY)
-    mean = angle @ value / total
-    return mean, np.sqrt(np.maximum(np.sum(angle * (value - mean[:, None]) ** 2, axis=1) / total, 0.0))
+def _moments(angle, value, within=0.0):
+    """Mean and standard deviation of ``value`` (cells,) weighted by ``angle`` (draws, cells), (draws,) each.
+
+    ``within`` (cells,) is the variance inside the cells. Signed weights make the moments those of what the data see; results stay
+    within the range of the values where the weights nearly cancel.
+    """
+    total = _safe_sum(angle)
+    mean = np.clip(angle @ value / total, value.min(), value.max())
+    square = np.sum(angle * ((value - mean[:, None]) ** 2 + within), axis=1) / total
+    return mean, np.sqrt(np.clip(square, 0.0, np.ptp(value) ** 2))
+
+
+def _safe_sum(angle):
+    """Sum over the cells, no less than LEAST_SUM of the sum of magnitudes."""
+    return np.maximum(angle.sum(axis=1), LEAST_SUM * np.abs(angle).sum(axis=1) + TINY)
 
 
 PARAMETERS = (
@@ -144,7 +153,7 @@ PARAMETERS = (
     ),
     Parameter(
         "drag_torque_Nm", "τ_d", "geometric", "N·m", 0.0,
-        "mean torque at which the clearance is crossed, weighted by the angle crossed (negative weights as zero)",
+        "mean torque at which the clearance is crossed, weighted by the angle crossed",
         lambda op: _crossing(op)[0],
     ),
     Parameter(
@@ -169,7 +178,7 @@ PARAMETERS = (
     ),
     Parameter(
         "friction_torque_Nm", "τ_f", "friction", "N·m", 0.0,
-        "mean play threshold at small loads, weighted by the angle of each play (negative weights as zero)",
+        "mean play threshold at small loads, weighted by the angle of each play",
         _friction_torque,
     ),
     Parameter(
