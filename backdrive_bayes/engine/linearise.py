@@ -28,6 +28,8 @@ LEAST_APART = 0.3
 CONSPICUOUS = 3.5
 """Whitened residual beyond which the knots near a block are refined."""
 REFINEMENTS = 3
+LEARNINGS = 4
+"""How often the jitter is learnt at most: a prediction made with too little of it hides most of it."""
 STEPS = 14
 TRIAL_STEPS = 2
 LONGEST_STEP = 2e-3
@@ -84,7 +86,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE, e
 
 
 def learn_jitter(linear: Linear) -> Jitter:
-    """The jitter with the highest marginal likelihood times its prior, other things as they are: uphill from the usual one."""
+    """The jitter with the highest marginal likelihood times its prior, other things as they are: uphill from the present one."""
     reduced, scale = linear.reduced, np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index]
     noise, slopes, columns = reduced.context.torque_noise, reduced.slopes(linear.predicted), linear.design.records()
 
@@ -94,8 +96,9 @@ def learn_jitter(linear: Linear) -> Jitter:
         prior = -0.5 * (np.log(jitter.torque / USUAL_JITTER.torque) / JITTER_LOG_SD) ** 2
         return data.log_marginal(scale) + data.log_volume + prior
 
-    known = {USUAL_JITTER: height(USUAL_JITTER)}
-    best = USUAL_JITTER
+    present = np.log([linear.jitter.torque / noise, linear.jitter.length])
+    best = min(JITTERS, key=lambda j: float(np.abs(np.log([j.torque, j.length]) - present).sum()))
+    known = {best: height(best)}
     while True:
         for other in _neighbours(best):
             known.setdefault(other, height(other) if other not in known else 0.0)
@@ -108,7 +111,7 @@ def learn_jitter(linear: Linear) -> Jitter:
 def _neighbours(jitter):
     sizes, lengths = sorted({j.torque for j in JITTERS}), sorted({j.length for j in JITTERS})
     i, j = sizes.index(jitter.torque), lengths.index(jitter.length)
-    near = ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1))
+    near = [(i + a, j + b) for a in (1, 0, -1) for b in (0, 1, -1) if a or b]
     return [Jitter(sizes[a], lengths[b]) for a, b in near if 0 <= a < len(sizes) and 0 <= b < len(lengths)]
 
 
@@ -121,7 +124,7 @@ class _Search:
 
     def run(self, distortion: Distortion, steps: int, refine: bool = False) -> Linear:
         reduced, context = self.reduced, self.reduced.context
-        jitter, learnt = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length), False
+        jitter, learnings = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length), LEARNINGS if refine else 0
         covariances = reduced.covariances(reduced.slopes(reduced.angles, 2.0), jitter)
         laid, weights, start, refined = None, None, None, 0
         for step in range(steps):
@@ -135,8 +138,9 @@ class _Search:
             weights = linear.weights
             moved = self._moved(linear)
             still = _length(moved, distortion, context) < 0.025 * LONGEST_STEP
-            if refine and not learnt and (still or step >= 4):
-                jitter, learnt = learn_jitter(linear), True
+            if learnings and (still or step >= 4):
+                found = learn_jitter(linear)
+                learnings, jitter = learnings - 1 if found != jitter else 0, found
             covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
             if refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
                 knots = _refined(linear)
@@ -144,7 +148,7 @@ class _Search:
                     reducer, weights, refined = ReducerClass(knots, self.modules), None, refined + 1
                     distortion = _towards(distortion, moved, context)
                     continue
-            if still and step >= 2:
+            if still and step >= 2 and not learnings:
                 break
             distortion = _towards(distortion, moved, context)
         return linear
