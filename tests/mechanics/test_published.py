@@ -1,6 +1,5 @@
 """Closed forms of eq. (20), reconstructed, against quadrature."""
 
-import numpy as np
 import pytest
 from scipy.integrate import quad
 

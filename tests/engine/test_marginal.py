@@ -1,0 +1,173 @@
+"""Marginalisation against dense algebra: log marginal likelihood, weights, offsets, noise scale, and the mode of the scales."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag, null_space
+from scipy.stats import invgamma, multivariate_normal, multivariate_t
+
+from backdrive_bayes.engine.marginal import Scales, Whitened, find_scales, whiten
+
+SIZES, WEIGHTS, DOF = (30, 22), 9, 25.0
+GROUP = np.repeat([0, 1, 2], 3)
+
+
+def covariance(rng, size):
+    time = np.sort(rng.uniform(0, 1, size))
+    return 0.3 * np.exp(-np.abs(time[:, None] - time) / 0.1) + 0.2 * np.eye(size)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """Columns, angles and covariances of two records with offsets, nine weights in three groups."""
+    rng = np.random.default_rng(4)
+    columns = [rng.standard_normal((n, WEIGHTS)) for n in SIZES]
+    covariances = [covariance(rng, n) for n in SIZES]
+    weights = np.repeat([1.0, 0.2, 0.01], 3) * rng.standard_normal(WEIGHTS)
+    noise = (np.linalg.cholesky(c) @ rng.standard_normal(n) for c, n in zip(covariances, SIZES, strict=True))
+    angles = [x @ weights + e + offset for x, e, offset in zip(columns, noise, (3.0, -7.0), strict=True)]
+    return columns, angles, covariances
+
+
+def free_of_offsets():
+    """An orthonormal basis of what no offset changes, (samples, samples - records)."""
+    return null_space(block_diag(*(np.ones((1, n)) for n in SIZES)))
+
+
+def dense(problem, scale):
+    """Log marginal likelihood, mean and covariance by matrices of all samples (restricted likelihood)."""
+    columns, angles, covariances = problem
+    basis = free_of_offsets()
+    x, y, c = basis.T @ np.vstack(columns), basis.T @ np.concatenate(angles), basis.T @ block_diag(*covariances) @ basis
+    total = c + (x * scale**2) @ x.T
+    gain = np.linalg.solve(total, x * scale**2).T
+    chi2 = y @ np.linalg.solve(total, y)
+    variance = (DOF + chi2) / (DOF + y.size)
+    spread = variance * (np.diag(scale**2) - gain @ (x * scale**2))
+    return multivariate_t.logpdf(y, None, total, DOF), gain @ y, spread
+
+
+def found(problem, scale):
+    columns, angles, covariances = problem
+    data = whiten(columns, angles, covariances, DOF)
+    return data, data.solve(scale)
+
+
+CASES = [np.exp(np.array(s)[GROUP]) for s in ([0.0, -1.0, -4.0], [-2.0, 1.0, -1.0], [1.5, -6.0, 0.3])]
+
+
+def test_log_marginal_likelihood_is_that_of_a_multivariate_t(problem):
+    ours, theirs = [], []
+    for scale in CASES:
+        data, solution = found(problem, scale)
+        assert solution.log_marginal == pytest.approx(data.log_marginal(scale), abs=1e-9)
+        ours.append(solution.log_marginal + data.log_volume)
+        theirs.append(dense(problem, scale)[0])
+    np.testing.assert_allclose(np.diff(ours), np.diff(theirs), atol=1e-8)
+
+
+def test_other_noise_is_compared_by_its_volume(problem):
+    """The jitter is learnt by comparing covariances: the whitening's volume counts."""
+    columns, angles, covariances = problem
+    louder = columns, angles, [c + 0.4 * np.diag(np.linspace(0, 1, c.shape[0])) for c in covariances]
+    ours, theirs, bare = [], [], []
+    for case in (problem, louder):
+        data, solution = found(case, CASES[0])
+        ours.append(solution.log_marginal + data.log_volume)
+        bare.append(solution.log_marginal)
+        theirs.append(dense(case, CASES[0])[0])
+    assert np.diff(ours) == pytest.approx(np.diff(theirs), abs=1e-8)
+    assert abs(np.diff(bare) - np.diff(theirs)) > 1.0, "without the volume the comparison must be wrong"
+
+
+@pytest.mark.parametrize("scale", CASES)
+def test_weights_have_the_dense_mean_and_covariance(problem, scale):
+    _, solution = found(problem, scale)
+    _, mean, spread = dense(problem, scale)
+    np.testing.assert_allclose(solution.mean, mean, atol=1e-10)
+    np.testing.assert_allclose(solution.root @ solution.root.T * solution.variance, spread, atol=1e-12)
+
+
+def test_offsets_do_not_matter_and_their_dimension_is_counted(problem):
+    columns, angles, covariances = problem
+    data, solution = found(problem, CASES[0])
+    _, moved = found((columns, [a + s for a, s in zip(angles, (100.0, -3.0), strict=True)], covariances), CASES[0])
+    np.testing.assert_allclose(moved.mean, solution.mean, atol=1e-9)
+    assert data.samples == sum(SIZES) - len(SIZES)
+    wrong = replace(data, samples=sum(SIZES))
+    away = wrong.solve(CASES[0]).log_marginal - wrong.solve(CASES[1]).log_marginal
+    right = dense(problem, CASES[0])[0] - dense(problem, CASES[1])[0]
+    assert abs(away - right) > 1e-3, "offsets that cost nothing must be seen"
+
+
+def test_the_noise_scale_is_integrated():
+    """Against quadrature over the variance of an ordinary Gaussian."""
+    rng = np.random.default_rng(1)
+    x, y = rng.standard_normal((8, 3)), rng.standard_normal(8)
+    data, logs = Whitened(x, y, 8, 6.0), []
+    edges = np.linspace(0.0, 1.0, 4001)
+    variances = invgamma(3.0, scale=3.0).ppf(0.5 * (edges[1:] + edges[:-1]))
+    for scale in (np.full(3, 0.3), np.array([2.0, 0.1, 1.0])):
+        total = np.eye(8) + (x * scale**2) @ x.T
+        brute = np.mean([multivariate_normal.pdf(y, None, v * total) for v in variances])
+        logs.append((np.log(brute), data.log_marginal(scale)))
+    assert np.diff(np.array(logs)[:, 0]) == pytest.approx(np.diff(np.array(logs)[:, 1]), abs=1e-3)
+
+
+def small_problem():
+    rng = np.random.default_rng(9)
+    x = rng.standard_normal((24, 6))
+    y = x @ (np.repeat([1.0, 0.1], 3) * rng.standard_normal(6)) + rng.standard_normal(24)
+    return Whitened(x, y, 24, 30.0), Scales(np.repeat([0, 1], 3), np.array([-0.5, -1.0]), np.array([1.0, 0.7]))
+
+
+def test_evidence_of_two_scales_by_quadrature_is_that_of_draws_from_the_prior():
+    """Nothing integrated by hand: scales, variance and weights are drawn from their priors, the likelihood is averaged."""
+    data, scales = small_problem()
+    nodes, share = np.polynomial.hermite_e.hermegauss(40)
+    share = share / share.sum()
+    points = [scales.mean + scales.sd * np.array([a, b]) for a in nodes for b in nodes]
+    logs = np.array([data.log_marginal(scales.of_weights(p)) for p in points])
+    constant = multivariate_t.logpdf(data.y, None, np.eye(24), 30.0) + 0.5 * 54 * np.log1p(data.total / 30.0)
+    quadrature = constant + np.log(np.sum(np.outer(share, share).ravel() * np.exp(logs - logs.max()))) + logs.max()
+    rng, count = np.random.default_rng(0), 400_000
+    variance = 30.0 / rng.chisquare(30.0, count)
+    sd = np.exp(scales.mean + scales.sd * rng.standard_normal((count, 2)))[:, scales.group]
+    weights = sd * rng.standard_normal((count, 6)) * np.sqrt(variance)[:, None]
+    chi2 = data.total - 2 * weights @ data.moment + np.einsum("ij,jk,ik->i", weights, data.gram, weights)
+    like = -0.5 * chi2 / variance - 12 * np.log(2 * np.pi * variance)
+    ratio = np.exp(like - like.max())
+    error = ratio.std() / ratio.mean() / np.sqrt(count)
+    assert error < 0.05
+    brute = np.log(ratio.mean()) + like.max()
+    assert abs(brute - quadrature) < 4 * error
+    fixed = constant + data.log_marginal(scales.of_weights(scales.mean))
+    assert abs(fixed - brute) > 8 * error, "scales that are not integrated must be seen"
+
+
+def height(data, scales, log_scale):
+    return data.log_marginal(scales.of_weights(log_scale)) + scales.log_prior(log_scale)
+
+
+@pytest.mark.parametrize("start", [None, np.array([2.0, -5.0])])
+def test_the_mode_of_the_scales_is_a_maximum(start):
+    data, scales = small_problem()
+    mode, solution = find_scales(data, scales, start)
+    top = height(data, scales, mode)
+    assert solution.log_marginal == pytest.approx(data.log_marginal(scales.of_weights(mode)))
+    for k in range(2):
+        step = 1e-4 * np.eye(2)[k]
+        slope = (height(data, scales, mode + step) - height(data, scales, mode - step)) / 2e-4
+        assert abs(slope) < 0.03
+        assert all(height(data, scales, mode + s * np.eye(2)[k]) < top for s in (-0.2, 0.2))
+    away = mode + np.array([0.5, 0.0])
+    assert abs(height(data, scales, away + 1e-4) - height(data, scales, away - 1e-4)) / 2e-4 > 0.03
+
+
+def test_a_fixed_scale_stays_where_it_is():
+    data, scales = small_problem()
+    fixed = Scales(scales.group, scales.mean, np.array([0.0, 0.7]))
+    mode, _ = find_scales(data, fixed)
+    assert mode[0] == scales.mean[0] and mode[1] != scales.mean[1]
+    assert fixed.log_prior(np.array([99.0, -1.0])) == 0.0

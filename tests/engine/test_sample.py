@@ -1,0 +1,154 @@
+"""Draws against quadrature, the same bytes for one seed, evaluations that are counted, and convergence that is said."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from backdrive_bayes.engine import sample as engine
+from backdrive_bayes.engine.marginal import Scales, Whitened, find_scales
+from backdrive_bayes.engine.sample import compress, draw_weights, sample
+
+
+def problem(groups=2, seed=9):
+    """Whitened data of three weights a group, the second group's hardly told from nothing."""
+    rng = np.random.default_rng(seed)
+    group = np.repeat(np.arange(groups), 3)
+    x = rng.standard_normal((24, group.size))
+    y = x @ (np.array([1.0, 0.1])[group] * rng.standard_normal(group.size)) + rng.standard_normal(24)
+    return Whitened(x, y, 24, 30.0), Scales(group, np.array([-0.5, -1.0])[:groups], np.array([1.0, 0.7])[:groups])
+
+
+def drawn(groups=2, seed=0, notes=None):
+    data, scales = problem(groups)
+    mode, _ = find_scales(data, scales)
+    return data, scales, sample(data, scales, mode, ("a", "b")[:groups], seed, (notes if notes is not None else []).append)
+
+
+def grid(data, scales, points=121):
+    """Log scales over nine standard deviations and their posterior probabilities."""
+    axes = [m + s * np.linspace(-5, 4, points) for m, s in zip(scales.mean, scales.sd, strict=True)]
+    mesh = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
+    logs = np.array([data.log_marginal(scales.of_weights(p)) + scales.log_prior(p) for p in mesh])
+    weight = np.exp(logs - logs.max())
+    return mesh, weight / weight.sum()
+
+
+def moments(values, weight):
+    mean = weight @ values
+    return mean, np.sqrt(weight @ (values - mean) ** 2)
+
+
+@pytest.mark.parametrize("groups", [1, 2])
+def test_draws_are_those_of_quadrature(groups):
+    data, scales, found = drawn(groups)
+    mesh, weight = grid(data, scales, 121 if groups == 1 else 61)
+    mean, sd = moments(mesh, weight)
+    flat = found.log_scale.reshape(-1, groups)
+    error = sd / np.sqrt(found.convergence.bulk_ess)
+    assert np.all(np.abs(flat.mean(axis=0) - mean) < 4 * error)
+    np.testing.assert_allclose(flat.std(axis=0), sd, rtol=0.15)
+    for k in range(groups):
+        order = np.argsort(mesh[:, k], kind="stable")
+        median = mesh[order, k][np.searchsorted(np.cumsum(weight[order]), 0.5)]
+        assert abs(np.mean(flat[:, k] < median) - 0.5) < 0.1
+    assert np.any(np.abs(scales.mean - mean) > 4 * error), "the prior's means must fail this check"
+
+
+def test_weights_are_those_of_quadrature():
+    data, scales, found = drawn()
+    mesh, weight = grid(data, scales, 41)
+    solved = [data.solve(scales.of_weights(p)) for p in mesh]
+    means = np.array([s.mean for s in solved])
+    dof = data.noise_dof + data.samples
+    spread = np.array([np.sum(s.root**2, axis=1) * s.variance * dof / (dof - 2) for s in solved])
+    mean = weight @ means
+    sd = np.sqrt(weight @ (spread + (means - mean) ** 2))
+    flat = found.weights.reshape(-1, mean.size)
+    # Weights are drawn anew for each draw: nearly independent.
+    assert np.all(np.abs(flat.mean(axis=0) - mean) < 5 * sd / np.sqrt(0.5 * len(flat)))
+    np.testing.assert_allclose(flat.std(axis=0), sd, rtol=0.1)
+    assert not np.allclose(0.5 * flat.std(axis=0), sd, rtol=0.1)
+
+
+def test_one_seed_gives_the_same_bytes_and_another_does_not():
+    first, again, other = (drawn(seed=s)[2] for s in (3, 3, 4))
+    for name in ("log_scale", "weights", "log_density"):
+        assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
+        assert getattr(first, name).tobytes() != getattr(other, name).tobytes()
+    assert first.acceptance == again.acceptance
+
+
+def test_chains_differ_from_one_another():
+    found = drawn()[2]
+    assert len({c.tobytes() for c in found.log_scale}) == engine.ENSEMBLES
+
+
+def test_evaluations_are_counted(monkeypatch):
+    calls = []
+    one = engine._Target.one
+    monkeypatch.setattr(engine._Target, "one", lambda self, p: calls.append(1) or one(self, p))
+    notes = []
+    found = drawn(notes=notes)[2]
+    # The Laplace approximation's differences count as well.
+    assert found.convergence.evaluations == len(calls) and notes[-1].startswith(f"{len(calls)} evaluations")
+
+
+def test_too_few_steps_are_said_not_to_have_converged(monkeypatch):
+    assert drawn()[2].convergence.converged
+    monkeypatch.setattr(engine, "FIRST_STEPS", 2)
+    monkeypatch.setattr(engine, "MOST_STEPS", 2)
+    tiny = drawn()[2].convergence
+    assert not tiny.converged and tiny.to_json()["advice"].startswith("not converged")
+
+
+def test_the_density_is_that_of_the_model_up_to_a_constant():
+    data, scales, found = drawn()
+    at = found.log_scale.reshape(-1, 2)[:20]
+    ours = np.array([data.log_marginal(scales.of_weights(p)) + scales.log_prior(p) for p in at])
+    away = found.log_density.ravel()[:20] - ours
+    np.testing.assert_allclose(away, away[0], atol=0.02)
+
+
+def test_compressed_data_have_the_same_log_marginal_likelihood():
+    """Sixty columns of which most are seen by no data."""
+    rng = np.random.default_rng(2)
+    parts = [rng.standard_normal((80, 30)) * np.geomspace(10.0, 1e-6, 30) for _ in range(2)]
+    x = np.hstack([p @ np.linalg.qr(rng.standard_normal((30, 30)))[0] for p in parts])
+    data = Whitened(x, x @ rng.standard_normal(60) + rng.standard_normal(80), 80, 50.0)
+    scales = Scales(np.repeat([0, 1], 30), np.zeros(2), np.ones(2))
+    mode, _ = find_scales(data, scales)
+    small, basis = compress(data, scales, mode)
+    assert small.x.shape[1] < 45 and basis.turn.shape[1] + basis.rest.shape[1] == 60
+    for step in ((0.0, 0.0), (1.0, -1.0), (engine.ABOVE, engine.ABOVE)):
+        log_scale = mode + np.array(step)
+        whole, part = data.log_marginal(scales.of_weights(log_scale)), small.log_marginal(np.exp(log_scale)[basis.group])
+        assert abs(whole - part) < 0.01
+    lost, kept = data.log_marginal(scales.of_weights(mode + 6)), small.log_marginal(np.exp(mode + 6)[basis.group])
+    assert abs(lost - kept) > 0.01, "far above the mode directions count that were set apart"
+
+
+def test_unseen_directions_keep_their_prior():
+    data, scales = problem()
+    blind = Whitened(np.hstack([data.x, np.zeros((24, 3))]), data.y, 24, 30.0)
+    more = Scales(np.repeat([0, 1], [3, 6]), scales.mean, scales.sd)
+    small, basis = compress(blind, more, more.mean)
+    weights = draw_weights(small, basis, np.array([-0.5, -1.0]), 20_000, np.random.default_rng(0))
+    solution = blind.solve(np.exp(more.mean)[more.group])
+    dof = blind.noise_dof + blind.samples
+    expected = solution.root @ solution.root.T * solution.variance * dof / (dof - 2)
+    np.testing.assert_allclose(np.cov(weights.T), expected, atol=0.05 * np.diag(expected).max())
+    np.testing.assert_allclose(weights.mean(axis=0), solution.mean, atol=0.02)
+    assert np.std(weights[:, -1]) == pytest.approx(np.exp(-1.0) * np.sqrt(solution.variance * dof / (dof - 2)), rel=0.03)
+
+
+def test_the_move_proposes_from_its_own_density():
+    """The independence move's density is that of its points, up to a constant: a histogram against it in one dimension."""
+    move = engine._Independence(np.array([1.0]), np.array([[0.5]]))
+    points = move.draw(np.random.RandomState(0), 40_000)[:, 0]
+    edges = np.linspace(-0.5, 2.5, 25)
+    density = np.exp(move.log_density(0.5 * (edges[1:] + edges[:-1])[:, None]))
+    counts = np.histogram(points, edges)[0]
+    expected = density / density.sum() * counts.sum()
+    assert np.all(np.abs(counts - expected) < 5 * np.sqrt(expected) + 0.02 * expected)
+    normal = norm(1.0, 0.5).pdf(0.5 * (edges[1:] + edges[:-1]))
+    assert np.any(np.abs(counts - normal / normal.sum() * counts.sum()) > 5 * np.sqrt(expected))
