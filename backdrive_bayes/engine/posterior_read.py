@@ -13,7 +13,7 @@ from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.effect import Context, Distortion
 from backdrive_bayes.mechanics.reducer import ReducerClass
-from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
+from backdrive_bayes.mechanics.registry import BENCH, UNKNOWN, all_effects
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
 from backdrive_bayes.results import read_group
@@ -89,7 +89,7 @@ def _rebuilt(groups) -> Posterior:
 
 
 def _effects(names):
-    known = {e.name: e for terms in all_effects().values() for e in terms} | {UNKNOWN.name: UNKNOWN}
+    known = {e.name: e for terms in (*all_effects().values(), (UNKNOWN,), BENCH) for e in terms}
     return tuple(known[name] for name in filter(None, names.split(",")))
 
 
