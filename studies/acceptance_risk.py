@@ -5,8 +5,8 @@
 Every unit's parameters are drawn about the usual ones and its records simulated with a bench's noise, without and with an effect
 that the model does not hold (creep: part of the compliance answers late). Upper limits are then put around the true indicators,
 up to four posterior standard deviations away on either side, as often within as out of limits. Written: acceptance_risk.json.
-Realised risks are those of the verdict: of the units accepted the share that is out of limits, of the units rejected the share within.
-"near" counts only decisions whose stated risk is more than half the agreed one. The naive decision compares the classic
+Realised risks are those of the verdict: of the units accepted the share that is out of limits, of the units rejected the share
+within. "near" counts only decisions whose stated risk is more than half the agreed one. The naive decision compares the classic
 least-squares point estimate with the limit.
 """
 
