@@ -10,6 +10,7 @@ import numpy as np
 from backdrive_bayes.engine.marginal import Scales
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import Distortion, Effect, FlankEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.history import History, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
@@ -118,6 +119,10 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
             rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
             columns = (reducer.flank_columns(h, weights, distortion.exponents, rate) for h, rate in rates)
             groups.append(Group(effect.name, tuple(columns)))
+        if effect is BENCH_HYSTERESIS:
+            late = next(g for g in groups if g.name == "sensor_lag")
+            # A lag moves the torque by rate times lag, friction of the bench by the same amount at every rate.
+            groups.append(Group(effect.name, tuple(c / rate for c, rate in zip(late.columns, reduced.context.rate, strict=True))))
         if not isinstance(effect, TangentEffect) or not told(reduced, effect):
             continue
         moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + effect.step})

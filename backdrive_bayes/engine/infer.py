@@ -7,24 +7,20 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from backdrive_bayes.engine.design import class_priors
-from backdrive_bayes.engine.linearise import WIDE, Linear, linearise
+from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.linearise import Linear, linearise
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.engine.reduced import Reduced, reduce_unit
 from backdrive_bayes.engine.sample import sample
-from backdrive_bayes.mechanics.registry import all_effects
+from backdrive_bayes.mechanics.registry import BENCH, all_effects
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
-PRESENT_SD = 1.0
-"""Standard deviation of the log scale of an effect that a hypothesis holds."""
-
-
 def library_terms():
-    """Every term of every listed effect."""
-    return tuple(term for terms in all_effects().values() for term in terms)
+    """Every term of every listed effect, and what every bench has."""
+    return (*(term for terms in all_effects().values() for term in terms), *BENCH)
 
 
 def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda text: None) -> Linear:
@@ -36,14 +32,13 @@ def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda t
         return linearise(reduced, library_terms(), modules)
 
 
-def infer(linear: Linear, hypothesis: tuple[str, ...] | None = None, seed: int = 0, note=lambda text: None) -> Posterior:
+def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=lambda text: None) -> Posterior:
     """Posterior of a unit.
 
-    ``hypothesis`` names effects that are present while all others stay at trace level; with None every effect has a wide scale of
-    its own, which averages over what may be there.
+    ``hypothesis`` names effects that are present while all others stay at trace level.
     """
     with threadpool_limits(1, user_api="blas"):
-        scales = linear.design.scales(_priors(linear, hypothesis))
+        scales = linear.design.scales(levels(linear, hypothesis))
         start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
         mode, solution = find_scales(linear.data, scales, start)
         drawn = sample(linear.data, scales, mode, linear.design.names, seed, note)
@@ -69,21 +64,6 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] | None = None, seed: int =
         hypothesis=hypothesis,
         jitter=(linear.jitter.torque * reduced.torque_scale_nm, linear.jitter.length * reduced.torque_scale_nm),
     )
-
-
-def _priors(linear, hypothesis):
-    context, priors = linear.reduced.context, class_priors(linear.reducer)
-    present = {t.name for n in hypothesis or () for t in all_effects().get(n, ())}
-    for effect in linear.effects:
-        if hypothesis is None:
-            priors[effect.name] = (float(np.log(effect.present(context))), WIDE)
-        elif effect.name in present:
-            priors[effect.name] = (float(np.log(effect.present(context))), PRESENT_SD)
-        else:
-            priors[effect.name] = (float(np.log(effect.trace(context))), 0.0)
-    for name in linear.design.names:
-        priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))
-    return priors
 
 
 def _facts(reduced: Reduced) -> RecordFacts:

@@ -19,6 +19,7 @@ from backdrive_bayes.engine.marginal import Solution, Whitened, find_scales, whi
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.reducer import BASELINE, TOP, ReducerClass, place_knots, spaced
 
 KNOTS = 60
@@ -30,6 +31,8 @@ CONSPICUOUS = 3.5
 REFINEMENTS = 3
 LEARNINGS = 4
 """How often the jitter is learnt at most: a prediction made with too little of it hides most of it."""
+FREE_PLAY = (-8.0, -4.5)
+"""Log scales of free play from which its mode is sought: hardly any, and as much as there is clearance."""
 STEPS = 14
 TRIAL_STEPS = 2
 LONGEST_STEP = 2e-3
@@ -178,11 +181,23 @@ class _Search:
 
     def _solve(self, reducer, design, angles, covariances, start):
         priors = class_priors(reducer)
-        priors |= {e.name: (float(np.log(e.present(self.reduced.context))), WIDE) for e in self.effects}
+        for effect in self.effects:
+            level = float(np.log(effect.present(self.reduced.context)))
+            priors[effect.name] = (level, 0.0 if effect is BENCH_HYSTERESIS else WIDE)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof)
-        log_scale, solution = find_scales(data, design.scales(priors), start, 12 if start is None else 4)
-        return data, log_scale, solution
+        scales = design.scales(priors)
+        if start is not None:
+            return data, *find_scales(data, scales, start, 4)
+        # Steps near zero torque are free play or clearance: two modes, of which the better is taken.
+        found = []
+        for level in FREE_PLAY:
+            begin = scales.mean.copy()
+            if "free_play" in design.names:
+                begin[design.names.index("free_play")] = level
+            log_scale, solution = find_scales(data, scales, begin, 12)
+            found.append((solution.log_marginal + scales.log_prior(log_scale), log_scale, solution))
+        return data, *max(found, key=lambda f: f[0])[1:]
 
     def _moved(self, linear):
         weights = linear.weights

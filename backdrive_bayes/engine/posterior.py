@@ -57,7 +57,7 @@ class Posterior:
     convergence: Convergence
     acceptance: float
     seed: int
-    hypothesis: tuple[str, ...] | None = None
+    hypothesis: tuple[str, ...] = ()
     jitter: tuple[float, float] = (0.0, 0.0)
     doubts: tuple[str, ...] = ()
 

@@ -18,6 +18,8 @@ DOF = 6.0
 """Degrees of freedom of the Student-t that proposes: heavier tails than the posterior's."""
 INFLATED = 1.1
 """Standard deviations of the proposal over those of the Laplace approximation."""
+WIDTHS = ((1.0, 0.7), (2.5, 0.3))
+"""Widths of the two parts of the proposal, and their shares: a scale that the data do not need has a long lower tail."""
 FIRST_STEPS = 12
 MOST_STEPS = 384
 KEPT = 250
@@ -36,19 +38,25 @@ class Draws:
 
 
 class _Independence(Move):
-    """Proposes every walker anew from a Student-t about the mode (Metropolised independence)."""
+    """Proposes every walker anew from a mixture of a narrow and a wide Student-t (Metropolised independence)."""
 
     def __init__(self, mean, root):
         self.mean, self.root = mean, root
 
     def log_density(self, x):
         """Log density up to a constant, (walkers,)."""
-        z = solve_triangular(self.root, (x - self.mean).T, lower=True, check_finite=False)
-        return -0.5 * (DOF + self.mean.size) * np.log1p(np.sum(z**2, axis=0) / DOF)
+        square = np.sum(solve_triangular(self.root, (x - self.mean).T, lower=True, check_finite=False) ** 2, axis=0)
+        size = self.mean.size
+        parts = [
+            np.log(share) - size * np.log(width) - 0.5 * (DOF + size) * np.log1p(square / (DOF * width**2))
+            for width, share in WIDTHS
+        ]
+        return np.logaddexp.reduce(parts, axis=0)
 
     def draw(self, random, count):
         """Points (count, dimension)."""
-        scale = np.sqrt(DOF / random.chisquare(DOF, count))
+        width = np.where(random.random_sample(count) < WIDTHS[0][1], WIDTHS[0][0], WIDTHS[1][0])
+        scale = width * np.sqrt(DOF / random.chisquare(DOF, count))
         return self.mean + (random.standard_normal((count, self.mean.size)) @ self.root.T) * scale[:, None]
 
     def propose(self, model, state):
@@ -72,7 +80,7 @@ def sample(data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, n
     samplers = []
     for chain in range(ENSEMBLES):
         sampler = emcee.EnsembleSampler(
-            WALKERS, free.size, target, moves=[(move, 0.9), (DEMove(), 0.1)], vectorize=True
+            WALKERS, free.size, target, moves=[(move, 0.6), (DEMove(), 0.4)], vectorize=True
         )
         random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
         sampler.random_state = random.get_state()
@@ -110,7 +118,7 @@ def _run(samplers, names, target, note) -> Convergence:
         note(f"{target.evaluations} evaluations: {convergence.line()}")
         if convergence.converged or chains[0].shape[0] >= MOST_STEPS:
             return convergence
-        steps = chains[0].shape[0]
+        steps = max(FIRST_STEPS, chains[0].shape[0] // 2)
 
 
 def _thin(drawn):
@@ -189,6 +197,10 @@ def _adapted(target, move, seed) -> _Independence:
     return move
 
 
+OUTSIDE = -1e30
+"""Log density beyond the range of log scales."""
+
+
 class _Target:
     """Log posterior density of the free log scales, and how often it was evaluated."""
 
@@ -203,7 +215,7 @@ class _Target:
         """Density at one point (free scales,)."""
         self.evaluations += 1
         if np.any(point < LOG_SCALES[0]) or np.any(point > LOG_SCALES[1]):
-            return -np.inf
+            return OUTSIDE
         log_scale = self.mode.copy()
         log_scale[self.free] = point
         return self.data.log_marginal(np.exp(log_scale)[self.group]) + self.scales.log_prior(log_scale)

@@ -16,7 +16,7 @@ from backdrive_bayes.engine.periodic import wave_group
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import next_test, probabilities, where
 from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed, weigh
-from backdrive_bayes.gap.levels import levels
+from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.gap.parameters import effect_parameters, interval
 from backdrive_bayes.gap.properties import Property, find_properties
 from backdrive_bayes.gap.shrink import Fitted, fit_hypothesis, shrink
@@ -123,7 +123,8 @@ class _Found:
         likeliest = next(iter(answers))
         effects = () if likeliest == "none" else tuple(likeliest.split("+"))
         gap = where.estimate_gap(self.linear, self.rng)
-        before, after = self._fitted(()), self._fitted(effects)
+        # A process of each leg's own fits what is held out by itself: something unknown closes nothing.
+        before, after = self._fitted(()), self._fitted(tuple(e for e in effects if e != "unknown"))
         shrunk = shrink(self.linear, before, after, gap.weight)
         closed = shrunk.closed("after", self.rng, LEVEL)
         if self._hollow(effects, closed):
@@ -178,7 +179,7 @@ class _Found:
             frequency = next(f for h, f in self.weighed.frequency.items() if ENCODER in h)
             design = design.joined(replace(wave_group(linear, frequency), name="wave"))
             priors["wave"] = (float(np.log(6e-3)), 1.0)
-        if "unknown" in effects or STICK_SLIP in effects:
+        if STICK_SLIP in effects:
             design = design.joined(path_group(linear.reduced, UNKNOWN))
             priors[UNKNOWN.name] = (float(np.log(UNKNOWN.present(linear.reduced.context))), 2.0)
         for module in self.withheld:

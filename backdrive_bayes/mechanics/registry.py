@@ -7,6 +7,7 @@ from importlib.metadata import entry_points
 
 from backdrive_bayes.mechanics.effect import Effect
 from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS
+from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_RATE, FRICTION_RATE
 from backdrive_bayes.mechanics.effects.sensor_lag import SENSOR_LAG
 from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
@@ -36,3 +37,6 @@ def all_effects() -> dict[str, tuple[Effect, ...]]:
 
 
 UNKNOWN = UNEXPLAINED
+"""The process that stands for what no listed effect explains."""
+BENCH = (BENCH_HYSTERESIS,)
+"""What every bench has at trace level and no diagnosis can name."""

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.engine.design import class_priors
-from backdrive_bayes.engine.infer import PRESENT_SD
 from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.mechanics.registry import all_effects
+
+
+PRESENT_SD = 1.0
+"""Standard deviation of the log scale of an effect that a hypothesis holds."""
 
 
 def levels(linear: Linear, hypothesis: tuple[str, ...]) -> dict[str, tuple[float, float]]:

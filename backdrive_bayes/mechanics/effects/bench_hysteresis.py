@@ -1,0 +1,23 @@
+"""Friction between torque sensor and output shaft (cables, bearings of the bench): part of every test, below what can be told."""
+
+from backdrive_bayes.mechanics.effect import Effect
+
+
+class BenchHysteresis(Effect):
+    """The reducer feels the torque that is read less a small part that opposes motion.
+
+    It looks like friction of the reducer, so that no record tells it: it widens the intervals of what the loop encloses.
+    """
+
+    def trace(self, context):
+        """A tenth of the torque noise of a sample."""
+        return 0.1 * context.torque_noise
+
+    def present(self, context):
+        """As a trace: it is never an answer."""
+        return self.trace(context)
+
+
+BENCH_HYSTERESIS = BenchHysteresis(
+    "bench_hysteresis", "none", "loop wider by a small torque", "JCGM 100:2008, F.2.4 (corrections that are not made)", "N·m", False
+)
