@@ -1,0 +1,147 @@
+"""The mode: planted offset, lag and jitter are found, knots are refined where loops are steep, a clean unit is left clean."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.planted import SCALE, planted
+
+from backdrive_bayes.engine import linearise as engine
+from backdrive_bayes.engine.design import class_groups, class_priors
+from backdrive_bayes.engine.infer import library_terms
+from backdrive_bayes.engine.linearise import learn_jitter, linearise
+from backdrive_bayes.engine.marginal import find_scales, whiten
+from backdrive_bayes.engine.reduced import Jitter, reduce_unit
+from backdrive_bayes.engine.sample import ABOVE, compress
+from backdrive_bayes.engine.start import possible_starts
+from backdrive_bayes.mechanics.effect import Distortion
+from backdrive_bayes.mechanics.reducer import ReducerClass
+from backdrive_bayes.mechanics.registry import LIBRARY
+
+
+def mode(**options):
+    return linearise(reduce_unit(planted(**options)), library_terms())
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return mode()
+
+
+def test_a_clean_unit_is_explained_to_its_noise(clean):
+    for residual in clean.residuals():
+        assert 0.3 < np.mean(residual**2) < 1.6
+    assert abs(clean.distortion.offset) < 2e-4 and abs(clean.distortion.lag_s) < 1.5e-3
+    assert clean.jitter.torque < 1e-3
+
+
+@pytest.mark.parametrize(("offset_nm", "lag_s"), [(4e-4, 0.0), (-3e-4, 0.01)])
+def test_a_planted_offset_and_lag_are_found(offset_nm, lag_s):
+    """The slow record's torque moves by 2e-4 N·m within 10 ms, the fast one's by 1e-3."""
+    found = mode(offset_nm=offset_nm, lag_s=lag_s)
+    assert found.distortion.offset == pytest.approx(offset_nm / SCALE, abs=3e-4)
+    assert found.distortion.lag_s == pytest.approx(lag_s, abs=2.5e-3)
+    sd = {n: np.sqrt(found.solution.variance) * np.linalg.norm(found.solution.root[i]) for n, i in single(found).items()}
+    assert abs(found.weights["torque_offset"][0] - offset_nm / SCALE) < 4 * sd["torque_offset"]
+    assert abs(found.weights["sensor_lag"][0] - lag_s) < 4 * sd["sensor_lag"] + 1e-3
+    assert max(np.mean(r**2) for r in found.residuals()) < 1.6
+
+
+def single(linear):
+    """Numbers of the weights of offset and lag."""
+    names, index = linear.design.names, linear.design.index
+    return {n: int(np.flatnonzero(index == names.index(n))[0]) for n in ("torque_offset", "sensor_lag")}
+
+
+@pytest.mark.parametrize("offset_nm", [4e-4, -2e-4])
+def test_starts_hold_the_offset_before_any_model(offset_nm):
+    starts = possible_starts(reduce_unit(planted(offset_nm=offset_nm)))
+    assert all(s.offset == pytest.approx(offset_nm / SCALE, abs=2e-4) for s in starts)
+
+
+def test_one_start_holds_the_lag():
+    starts = possible_starts(reduce_unit(planted(lag_s=0.02)))
+    assert min(abs(s.lag_s - 0.02) for s in starts) < 2e-3 and starts[0].lag_s == 0.0
+
+
+def test_a_record_of_one_leg_starts_from_nothing():
+    unit = planted()
+    record = unit.records[0]
+    first = record.time_s < 4.9
+    alone = replace(record, time_s=record.time_s[first], torque_nm=record.torque_nm[first], angle_rad=record.angle_rad[first])
+    assert possible_starts(reduce_unit(replace(unit, records=(alone,)))) == [Distortion()]
+
+
+def test_an_offset_that_is_withheld_costs_likelihood(monkeypatch):
+    """A planted fault: held at no offset, the model takes a shifted loop for jitter and noise."""
+    monkeypatch.setattr(engine, "possible_starts", lambda reduced: [Distortion()])
+    reduced = reduce_unit(planted(offset_nm=8e-4))
+    free, held = (linearise(reduced, effects) for effects in (LIBRARY["torque_offset"], ()))
+    assert free.distortion.offset == pytest.approx(8e-3, abs=8e-4) and held.distortion.offset == 0.0
+    assert free.solution.log_marginal + free.data.log_volume > held.solution.log_marginal + held.data.log_volume + 50
+
+
+@pytest.mark.parametrize("jitter", [(0.0015, 0.002), (0.005, 0.05)])
+def test_a_planted_jitter_is_found_within_a_factor_of_three(jitter):
+    found = mode(jitter=jitter, drag=0.12, engagement=0.35)
+    assert jitter[0] / 3 < found.jitter.torque < 3 * jitter[0]
+    assert jitter[1] / 6 < found.jitter.length < 6 * jitter[1]
+    assert learn_jitter(found) == found.jitter, "what was learnt must hold at the mode"
+    assert max(np.mean(r**2) for r in found.residuals()) < 1.6
+
+
+def test_jitter_that_is_not_learnt_is_seen_in_the_residual(monkeypatch):
+    monkeypatch.setattr(engine, "LEARNINGS", 0)
+    found = mode(jitter=(0.005, 0.05), drag=0.12, engagement=0.35)
+    assert min(np.mean(r**2) for r in found.residuals()) > 3.0
+
+
+def test_knots_are_dense_where_the_loop_is_steep(clean):
+    knots = clean.reducer.knots
+    near = np.sum(np.abs(knots - 0.05) < 0.02)
+    # A thirtieth of the torques holds a third of the knots.
+    assert near > 0.25 * knots.size
+
+
+def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
+    """With few knots to begin with, a steep clearance leaves a residual; refined, it does not."""
+    monkeypatch.setattr(engine, "KNOTS", 8)
+    refined = mode(engagement=0.05)
+    monkeypatch.setattr(engine, "REFINEMENTS", 0)
+    coarse = mode(engagement=0.05)
+    assert coarse.reducer.knots.size <= 10 < refined.reducer.knots.size
+    added = np.setdiff1d(refined.reducer.knots, coarse.reducer.knots)
+    assert np.median(np.abs(added - 0.05)) < 0.03
+    assert refined.solution.log_marginal + refined.data.log_volume > coarse.solution.log_marginal + coarse.data.log_volume + 10
+
+
+def test_compressing_a_unit_changes_no_log_marginal_likelihood(clean):
+    scales = clean.design.scales(class_priors(clean.reducer) | {e.name: (np.log(1e-3), 0.0) for e in clean.effects})
+    at, _ = find_scales(clean.data, scales)
+    small, basis = compress(clean.data, scales, at)
+    assert small.x.shape[1] < clean.data.x.shape[1] - 30
+    rng, away = np.random.default_rng(0), []
+    for step in (0.0, *rng.uniform(-1.0, ABOVE, (6, 1))):
+        log_scale = at + step * scales.free
+        away.append(clean.data.log_marginal(scales.of_weights(log_scale)) - small.log_marginal(np.exp(log_scale)[basis.group]))
+    assert np.ptp(away) < 0.01 and np.abs(away).max() < 0.05
+
+
+def test_the_log_marginal_likelihood_of_a_unit_is_dense_algebra(clean):
+    """Two jitters and two sets of scales, with the class's own columns and covariances."""
+    from scipy.linalg import block_diag, null_space
+    from scipy.stats import multivariate_t
+
+    reduced = clean.reduced
+    design = class_groups(reduced, ReducerClass(clean.reducer.knots), clean.distortion)
+    basis = null_space(block_diag(*(np.ones((1, a.size)) for a in reduced.angles)))
+    x, y = basis.T @ np.vstack(design.records()), basis.T @ np.concatenate(reduced.angles)
+    ours, dense = [], []
+    for size, level in ((1.5e-4, 0.05), (1e-3, 0.01)):
+        covariances = reduced.covariances(reduced.slopes(clean.predicted), Jitter(size, 0.01))
+        data = whiten(design.records(), reduced.angles, covariances, reduced.scale_dof)
+        scale = np.full(data.x.shape[1], level)
+        ours.append(data.log_marginal(scale) + data.log_volume)
+        total = basis.T @ block_diag(*covariances) @ basis + (x * scale**2) @ x.T
+        dense.append(multivariate_t.logpdf(y, None, total, reduced.scale_dof))
+    assert np.diff(ours) == pytest.approx(np.diff(dense), rel=1e-5, abs=0.01)

@@ -1,0 +1,105 @@
+"""Intervals of small units of the class hold their truth as often as they say, and hardly move with the last bits of the data."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from support.planted import planted
+
+from backdrive_bayes.bench.known_truth import BenchNoise, random_reducer, simulate_unit
+from backdrive_bayes.engine import sample
+from backdrive_bayes.engine.infer import infer, library_terms
+from backdrive_bayes.engine.linearise import linearise
+from backdrive_bayes.engine.reduced import reduce_unit
+from backdrive_bayes.indicators.draws import IndicatorDraws, core_indicators
+from backdrive_bayes.indicators.loop import cut_loops, settled_history
+from backdrive_bayes.records.record import Unit
+
+UNITS, LEVEL, AMPLITUDE, RATE, K = 40, 0.9, 0.1, 0.1, 0.03
+NAMES = ("lost_motion_rad", "loop_area_J", "dissipation_ratio", "peak_angle_rad")
+LEAST, MOST = binom.interval(0.99, UNITS, LEVEL)
+
+
+def fitted(unit: Unit, effects=(), seed=0):
+    """A posterior of few blocks and few steps: log scales are drawn roughly, weights exactly."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (("WALKERS", 16), ("FIRST_STEPS", 4), ("MOST_STEPS", 4)):
+            patch.setattr(sample, name, value)
+        return infer(linearise(reduce_unit(unit, 30), effects), (), seed)
+
+
+def truth_of(known, torque):
+    angle = sum(p.cells.ends(settled_history(torque, RATE, AMPLITUDE)) @ known.weights[p.name] for p in known.reducer.parts)
+    return core_indicators(cut_loops(torque, angle[None] * known.angle_scale_rad), K * AMPLITUDE)
+
+
+@lru_cache(maxsize=1)
+def drawn():
+    """Draws of each indicator and its truth, for every unit."""
+    found = []
+    for seed in range(UNITS):
+        known = random_reducer(np.random.default_rng(seed))
+        unit = simulate_unit(known, [(AMPLITUDE, RATE)], BenchNoise(), np.random.default_rng(1000 + seed), 400.0)
+        draws = IndicatorDraws(fitted(unit, seed=seed), K)
+        truth = truth_of(known, draws.loops(RATE, AMPLITUDE).torque_nm)
+        found.append({n: (draws.values(n, RATE, AMPLITUDE), truth[n][0]) for n in NAMES})
+    return found
+
+
+def covered(name, shrunk=1.0):
+    """Units whose central interval holds the truth, the draws drawn together about their median by ``shrunk``."""
+    hits = 0
+    for unit in drawn():
+        values, truth = unit[name]
+        middle = np.median(values)
+        lo, hi = np.quantile(middle + shrunk * (values - middle), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
+        hits += lo <= truth <= hi
+    return hits
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_intervals_hold_the_truth_as_often_as_they_say(name):
+    assert LEAST <= covered(name) <= MOST
+
+
+def test_intervals_of_half_the_width_do_not():
+    """A planted fault: the area and the peak show it at once."""
+    assert min(covered("loop_area_J", 0.5), covered("peak_angle_rad", 0.5)) < LEAST - 3
+    assert sum(covered(n, 0.5) for n in NAMES) < sum(covered(n) for n in NAMES) - 25
+
+
+def test_intervals_are_narrow():
+    """Coverage is cheap with wide intervals; few blocks tell little of the lost motion alone."""
+    for name, most in (("lost_motion_rad", 0.5), ("loop_area_J", 0.05), ("dissipation_ratio", 0.1), ("peak_angle_rad", 0.1)):
+        widths = [np.diff(np.quantile(v, [0.05, 0.95]))[0] / abs(t) for v, t in (u[name] for u in drawn())]
+        assert np.median(widths) < most, (name, np.median(widths))
+
+
+def ends(posterior):
+    draws = IndicatorDraws(posterior, K)
+    return {n: np.quantile(draws.values(n, RATE, AMPLITUDE), [0.05, 0.95]) for n in NAMES}
+
+
+def test_the_last_bits_of_the_data_move_no_interval():
+    """Times, torques and angles times 1 ± 1e-12: no end moves by more than half a per cent of the width."""
+    unit, rng = planted(), np.random.default_rng(0)
+
+    def shaken(values):
+        return values * (1 + 1e-12 * rng.choice([-1.0, 1.0], values.size))
+
+    records = tuple(replace(r, torque_nm=shaken(r.torque_nm), angle_rad=shaken(r.angle_rad)) for r in unit.records)
+    here, there = (ends(fitted(u, library_terms())) for u in (unit, replace(unit, records=records)))
+    for name in NAMES:
+        assert np.abs(there[name] - here[name]).max() < 0.005 * np.diff(here[name])[0], name
+    other = ends(fitted(planted(seed=1), library_terms()))
+    assert any(np.abs(other[n] - here[n]).max() > 0.005 * np.diff(here[n])[0] for n in NAMES), "other noise must move them"
+
+
+def test_one_seed_gives_the_same_bytes():
+    unit = planted(loops=((0.1, 0.1),))
+    first, again, other = (fitted(unit, seed=s) for s in (5, 5, 6))
+    assert all(first.weights[n].tobytes() == again.weights[n].tobytes() for n in first.weights)
+    assert any(first.weights[n].tobytes() != other.weights[n].tobytes() for n in first.weights)
+    assert first.convergence.evaluations == again.convergence.evaluations

@@ -1,0 +1,47 @@
+"""Units of the class with planted faults, small enough to be analysed within a second or two."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise, physical_reducer, ramp
+from backdrive_bayes.records.record import Record, Unit
+
+NOISE = BenchNoise()
+LOOPS = ((0.1, 0.02), (0.1, 0.1))
+HERTZ = 400.0
+SCALE = 0.1
+
+
+def planted(seed=0, *, offset_nm=0.0, lag_s=0.0, jitter=None, loops=LOOPS, noise=NOISE, **options) -> Unit:
+    """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque."""
+    known = physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | options))
+    rng, records = np.random.default_rng(seed + 20), []
+    for amplitude, rate in loops:
+        time, torque = ramp(amplitude, rate, HERTZ)
+        angle = known.angle_rad(time, torque)
+        if jitter:
+            angle = _jittered(torque, angle, *jitter, rng)
+        angle = np.interp(time - lag_s, time, angle) + angle_noise(time.size, 1 / HERTZ, noise, rng)
+        read = torque - offset_nm + noise.torque_nm * rng.standard_normal(time.size)
+        records.append(Record(f"rate-{rate:g}-amplitude-{amplitude:g}.csv", time, read, angle, rate, amplitude))
+    return Unit("planted", SCALE, tuple(records))
+
+
+def changed(unit: Unit, change) -> Unit:
+    """The unit with ``change(record, index)`` added to the angles [rad]."""
+    return replace(unit, records=tuple(replace(r, angle_rad=r.angle_rad + change(r, i)) for i, r in enumerate(unit.records)))
+
+
+def _jittered(torque, angle, sd, length, rng):
+    """Every leg read at torques that wander by ``sd`` over ``length``."""
+    leg = np.cumsum(np.r_[0, np.diff(np.sign(np.diff(torque))) != 0, 0])
+    phi, found = np.exp(-abs(torque[1] - torque[0]) / (length * SCALE)), np.empty_like(angle)
+    for k in np.unique(leg):
+        own = np.flatnonzero(leg == k)
+        sign = np.sign(torque[own[-1]] - torque[own[0]])
+        drive = rng.standard_normal(own.size)
+        wander = lfilter([np.sqrt(1 - phi**2)], [1, -phi], drive, zi=[phi * rng.standard_normal()])[0]
+        found[own] = np.interp(sign * (torque[own] + sd * SCALE * wander), sign * torque[own], angle[own])
+    return found
