@@ -17,18 +17,23 @@ PANELS = (("loop_area_J", MJ_PER_J, "S(t) [mJ]"), ("dissipation_ratio", 1.0, "u(
 def draw(saved: Saved, records: list[int]):
     """S(t) [mJ] and u(t) of the given records (at most six) over the amplitude t [N·m]."""
     with styled():
-        figure = new_figure(2.75)
+        figure = new_figure(2.35)
         axes = figure.subplots(1, 2)
         labels = record_labels(saved.records)
-        for place, record in enumerate(records):
-            for panel, (key, factor, _) in zip(axes, PANELS, strict=True):
-                _series(panel, saved.records[record], key, factor, labels[record], place, len(records))
-        for panel, (_, _, name) in zip(axes, PANELS, strict=True):
-            panel.set(xlabel="amplitude t [N·m]", ylabel=name, xlim=(0, None), ylim=(0, None))
-            few_ticks(panel, 5)
+        draw_panels(axes, saved, records, labels)
         handles, names = axes[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=min(3, len(names)))
     return figure
+
+
+def draw_panels(axes, saved: Saved, records: list[int], labels: list[str]) -> None:
+    """S(t) into the first of two axes and u(t) into the second."""
+    for place, record in enumerate(records):
+        for panel, (key, factor, _) in zip(axes, PANELS, strict=True):
+            _series(panel, saved.records[record], key, factor, labels[record], place, len(records))
+    for panel, (_, _, name) in zip(axes, PANELS, strict=True):
+        panel.set(xlabel="amplitude t [N·m]", ylabel=name, xlim=(0, None), ylim=(0, None))
+        few_ticks(panel, 5)
 
 
 def _series(panel, record, key, factor, label, place, count):

@@ -11,6 +11,7 @@ from backdrive_bayes.figures import (
     comparison,
     corner_plot,
     diagnosis,
+    energy,
     loop,
     modules,
     predictive,
@@ -28,6 +29,7 @@ CAPTIONS = {
     "modules": modules.CAPTION,
     "torque-energy": torque_energy.CAPTION,
     "amplitude": amplitude.CAPTION,
+    "energy": energy.CAPTION,
     "corner": corner_plot.CAPTION,
     "trace": trace.CAPTION,
     "predictive": predictive.CAPTION,
@@ -64,6 +66,7 @@ def figures_of(saved: Saved) -> dict[str, Figure]:
     out |= _split("modules", modules.draw, saved, modules.distinct(saved), 1)
     out |= _split("torque-energy", torque_energy.draw, saved, everything, PER_FIGURE)
     out |= _split("amplitude", amplitude.draw, saved, everything, len(SERIES))
+    out["energy"] = energy.draw(saved)
     if saved.posterior_file:
         shared = list(corner_plot.shared_parameters(saved))
         out |= _split("corner", corner_plot.draw, saved, shared, corner_plot.in_one_figure(len(shared)))

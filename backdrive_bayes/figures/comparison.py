@@ -38,7 +38,7 @@ SHARES = (("S_g_over_S", "geometric error", BLUE, ""), ("S_f_over_S", "friction"
 def draw_loops(comparison: dict, conditions: list[int]):
     """Overlaid loops at the given overlays (at most three), angle [arcmin] over torque [N·m]."""
     with styled():
-        figure, axes = _overlaid(comparison, conditions, 3.3, _one_loop)
+        figure, axes = _overlaid(comparison, conditions, 2.3, _one_loop)
         for panel in axes:
             panel.set_xlabel("torque [N·m]")
         axes[0].set_ylabel("angle [arcmin]")
@@ -72,7 +72,7 @@ def draw_ratios(comparison: dict, pair: int):
     both = comparison["pairs"][pair]
     shown = [name for name in SHOWN if any((c["indicators"].get(name) or {}).get("ratio") for c in both["conditions"])]
     with styled():
-        figure = new_figure(1.2 + 0.11 * len(shown) * max(2.2, len(both["conditions"])))
+        figure = new_figure(0.9 + 0.05 * len(shown) * max(3.0, len(both["conditions"])))
         panel = figure.subplots()
         step = 0.7 / max(1, len(both["conditions"]))
         for i, condition in enumerate(both["conditions"]):
@@ -98,7 +98,7 @@ def draw_mechanism(comparison: dict):
     """Stacked shares of S and the elastic share of W_abs, one bar a unit and record."""
     bars = [(m["unit"], r) for m in comparison["mechanism"] for r in m["records"]]
     with styled():
-        figure = new_figure(1.0 + 0.27 * len(bars))
+        figure = new_figure(0.85 + 0.19 * len(bars))
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.5, 1])
         for row, (_, record) in enumerate(bars):
             begin = 0.0

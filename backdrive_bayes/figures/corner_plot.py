@@ -1,4 +1,4 @@
-"""Corner plot of the shared parameters."""
+"""Corner plot of the physical parameters."""
 
 from __future__ import annotations
 
@@ -23,16 +23,21 @@ from backdrive_bayes.figures.style import (
 )
 
 CAPTION = (
-    "Posterior of the parameters that all records share: marginal histograms and pairwise contours that "
+    "Posterior of the physical parameters, functionals of the drawn operator: marginal histograms and pairwise contours that "
     "hold 39 % and 86 % of the draws (one and two standard deviations of a normal)."
 )
 MOST = 16
 """Parameters in one figure; more are spread evenly over several."""
 LEVELS = (0.393, 0.865)
-HEIGHT_IN = 6.9
+HEIGHT_IN = (0.95, 0.33, 6.9)
+"""Height of what stands around the panels, of a panel, and of the whole figure at most [inch]."""
 PAD_IN = 0.06
 TICK_LINE_IN = 0.14
 """Height of a line of tick labels with the air that it needs."""
+
+
+NAME_IN = 0.42
+"""Height of a name above its panel."""
 
 
 def shared_parameters(saved: Saved) -> dict[str, tuple[np.ndarray, str]]:
@@ -53,13 +58,19 @@ def in_one_figure(parameters: int) -> int:
     return -(-parameters // max(1, -(-parameters // MOST)))
 
 
+def height_in(parameters: int) -> float:
+    """Height of the figure of so many parameters [inch]; few parameters get wide panels."""
+    below, panel, most = HEIGHT_IN
+    return min(most, below + max(panel, 1.6 / parameters) * parameters)
+
+
 def draw(saved: Saved, names: list[str]):
     """Corner plot of the named shared parameters (at most sixteen) in arcmin, mN·m or N·m."""
     corner = _corner()
     every = shared_parameters(saved)
     shown, n = {name: every[name] for name in names}, len(names)
     with styled():
-        figure = new_figure(HEIGHT_IN, constrained=False)
+        figure = new_figure(height_in(n), constrained=False)
         draws = np.stack([v.ravel() for v, _ in shown.values()], axis=1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -99,12 +110,12 @@ def _span(values):
 
 
 def _dress(axes, shown):
-    """At most two ticks a panel, and names in words with units at the left of each row and below each column."""
-    line = TICK_LINE_IN * len(axes) / 5.0
+    """At most two ticks a panel, and names in words with units above the diagonal."""
+    line = TICK_LINE_IN * len(axes) / (height_in(len(axes)) - HEIGHT_IN[0])
     for i, (name, (_, unit)) in enumerate(shown.items()):
-        text = two_lines(words(name), f"[{unit or '–'}]")
-        axes[-1, i].set_xlabel(text, rotation=90, ha="center", va="top", ma="right")
-        axes[i, 0].set_ylabel(text, rotation=0, ha="right", va="center")
+        text, last = two_lines(words(name), f"[{unit or '–'}]"), i == len(axes) - 1 and i > 0
+        place = {"ha": "right" if last else "left", "va": "bottom", "transform": moved(axes[i, i], 0, PAD_IN)}
+        axes[i, i].text(1.0 if last else 0.0, 1.0, text, **place)
         for j, panel in enumerate(axes[i, : i + 1]):
             panel.tick_params(length=2, pad=1.5)
             _ticks(panel.set_xticks, *panel.get_xlim(), line, i == len(axes) - 1)
@@ -133,13 +144,8 @@ def _inner_ticks(lo, hi, line):
 
 
 def _arrange(figure, axes):
-    """Names beside the longest tick label, and margins that hold both."""
+    """Margins that hold the longest tick labels, and the first name at the top."""
     ticks_x = max((size_in(t)[1] for panel in axes[-1] for t in panel.get_xticklabels()), default=0.0) + 2 * PAD_IN
     ticks_y = max((size_in(t)[0] for panel in axes[:, 0] for t in panel.get_yticklabels()), default=0.0) + 2 * PAD_IN
-    for panel in axes[-1]:
-        panel.xaxis.set_label_coords(0.5, 0, moved(panel, 0, -ticks_x))
-    for panel in axes[:, 0]:
-        panel.yaxis.set_label_coords(0, 0.5, moved(panel, -ticks_y, 0))
-    left = ticks_y + max(size_in(panel.yaxis.label)[0] for panel in axes[:, 0]) + PAD_IN
-    bottom = ticks_x + max(size_in(panel.xaxis.label)[1] for panel in axes[-1]) + PAD_IN
-    figure.subplots_adjust(left / WIDTH_IN, bottom / HEIGHT_IN, 0.99, 0.99, wspace=0.08, hspace=0.08)
+    height = height_in(len(axes))
+    figure.subplots_adjust(ticks_y / WIDTH_IN, ticks_x / height, 0.99, 1 - NAME_IN / height, wspace=0.08, hspace=0.08)

@@ -25,7 +25,7 @@ CAPTIONS = {
 FINE_DPI = 150
 ROW_IN = (0.19, 0.14)
 """Height of a row of the map at a glance and of a stripe in it, at least [inch]."""
-MAP_IN = 2.3
+MAP_IN = 2.6
 """Height of the map at a glance, at most [inch]."""
 _LINE = 104
 
@@ -68,8 +68,7 @@ def _split(name, kind, saved, records, at_most):
 
 def draw(saved: Diagnosed):
     """Answer and place in words; probabilities; before and after; gap map."""
-    row_in = diagnosis_map.row_height_in(saved, *ROW_IN)
-    records = diagnosis_map.heaviest(saved, diagnosis_map.fitting(MAP_IN, row_in))
+    records = mapped(saved)
     row_in = diagnosis_map.row_height_in(saved, *ROW_IN, len(records))
     lines = textwrap.wrap(drawable(saved.inconclusive or saved.summary, 3 * _LINE - 6), _LINE)
     held = len(diagnosis_closed.rows(saved, records)) if saved.shrink else 0
@@ -87,6 +86,11 @@ def draw(saved: Diagnosed):
         _closed(upper, closed, saved, records)
         _where(lower.subplots(), saved, records, row_in)
     return figure
+
+
+def mapped(saved: Diagnosed) -> list[int]:
+    """The records that the map at a glance has room for."""
+    return diagnosis_map.heaviest(saved, diagnosis_map.fitting(MAP_IN, diagnosis_map.row_height_in(saved, *ROW_IN)))
 
 
 def _head(part, height, answer, lines):

@@ -8,9 +8,8 @@ from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, FALLING, GREY, RISING, few_ticks, new_figure, styled
 
 CAPTION = (
-    "Measured minus modelled angle along the loop, before (baseline alone) and after the chosen effect is added, "
-    "on one scale; little that is left is shown once more on a scale of its own. The grey band is one standard "
-    "deviation of the noise to either side."
+    "Measured minus modelled angle along the loop, before (baseline alone) and after the chosen effect is added; little that is "
+    "left is shown once more on its own scale."
 )
 ZOOM = 3.0
 """Where the residual shrinks by this factor, what is left gets a row with a scale of its own."""
@@ -25,7 +24,7 @@ def draw(saved: Diagnosed, records: list[int]):
     entries = by_record(saved)
     rows = _rows([entries[r] for r in records]) if saved.enlarged else [("before_rad", "residual")]
     with styled():
-        figure = new_figure(0.9 + 1.3 * len(rows))
+        figure = new_figure(0.85 + 1.05 * len(rows))
         axes = figure.subplots(len(rows), len(records), sharex="col", sharey="row", squeeze=False)
         for column, record in zip(axes.T, records, strict=True):
             for panel, (key, _) in zip(column, rows, strict=True):

@@ -62,11 +62,15 @@ def chance(probability: float) -> str:
 
 
 def share_text(interval: dict | None) -> str:
-    """A fraction with its interval as per cent."""
+    """A closed fraction with its interval as per cent; ends at −100 % are bounds, because fractions are clipped there."""
     if not interval:
         return "not defined"
-    median, lo, hi = (f"{round(100 * interval[k])}".replace("-", "−") for k in ("median", "lo", "hi"))
+    median, lo, hi = (_per_cent(interval[k]) for k in ("median", "lo", "hi"))
     return f"{median} %" if interval["lo"] == interval["hi"] else f"{median} % [{lo}, {hi}]"
+
+
+def _per_cent(share):
+    return "≤ −100" if share <= -0.995 else f"{round(100 * share)}".replace("-", "−")
 
 
 def signed(value: float | None) -> str:

@@ -26,7 +26,7 @@ _STEPS = {1: 10, 2: 6, 3: 5}
 def draw(saved: Saved, records: list[int]):
     """Loops of the given records in columns, angle [arcmin] over torque [N·m], residual strips beneath."""
     with styled():
-        figure = new_figure(3.7)
+        figure = new_figure(3.35)
         ratios = [3, 1.15] if saved.posterior_file else [1]
         axes = figure.subplots(
             len(ratios), len(records), sharex="col", sharey="row", squeeze=False, height_ratios=ratios

@@ -17,23 +17,26 @@ from backdrive_bayes.figures.style import (
 )
 
 CAPTION = (
-    "The settled loop as the sum of its modules (median curves) and of the effects, which are the loop "
-    "minus the sum of the modules. Panels share the loop's angle scale unless they say otherwise."
+    "The settled loop as the sum of its modules (median curves) and of the effects, which are the loop minus the sum of the "
+    "modules and are left out where they span less than 2 % of it. Panels share the loop's angle scale unless they say otherwise."
 )
-COLUMNS = 3
-LETTERS = 15
+COLUMNS = 4
+VISIBLE = 0.02
+"""Effects that span less than this share of the loop's range have no panel."""
+LETTERS = 9
 """Longer names leave no room for more beside them."""
 LEGIBLE = 0.1
 """Panels that span less than this share of the loop's range get a scale of their own."""
-ALIKE = 0.01
+ALIKE = 0.03
 """Records whose loops agree to this share of the peak angle are shown once."""
 
 
 def distinct(saved: Saved) -> list[int]:
-    """Records whose module curves differ visibly from those of the records before them."""
+    """Records whose module curves differ visibly from those before them, the main one first."""
     kept: list[int] = []
-    for i, record in enumerate(saved.records):
-        if not any(_alike(record, saved.records[j]) for j in kept):
+    main = saved.main_record
+    for i in [main, *(i for i in range(len(saved.records)) if i != main)]:
+        if not any(_alike(saved.records[i], saved.records[j]) for j in kept):
             kept.append(i)
     return kept
 
@@ -60,14 +63,14 @@ def draw(saved: Saved, records: list[int]):
     curves = _curves(record)
     rows = -(-len(curves) // COLUMNS)
     with styled():
-        figure = new_figure(0.4 + 1.6 * rows)
-        axes = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
+        figure = new_figure(0.55 + 1.4 * rows)
+        axes = figure.subplots(rows, min(COLUMNS, len(curves)), sharex=True, squeeze=False).ravel()
         for panel, (name, rising, falling) in zip(axes, curves, strict=False):
             torque = record["loop"]["torque_Nm"]
             panel.plot(torque, np.multiply(rising, ARCMIN_PER_RAD), **RISING, label="rising torque")
             panel.plot(torque, np.multiply(falling, ARCMIN_PER_RAD), **FALLING, label="falling torque")
             panel.set_title(name)
-            few_ticks(panel)
+            few_ticks(panel, 3)
             panel.tick_params(labelbottom=True)
             panel.set_xlabel("torque [N·m]")
         _scales(axes, curves)
@@ -82,7 +85,9 @@ def _curves(record):
         m: [np.asarray(c[k]) for k in ("rising_rad", "falling_rad")] for m, c in record["modules"].items()
     }
     rest = [whole - sum(parts[i] for parts in modules.values()) for i, whole in enumerate(loop)]
-    return [("settled loop", *loop), *((words(m), *c) for m, c in modules.items()), ("effects", *rest)]
+    seen = max(np.ptp(r) for r in rest) >= VISIBLE * max(np.ptp(b) for b in loop)
+    effects = [("effects", *rest)] if seen else []
+    return [("settled loop", *loop), *((words(m), *c) for m, c in modules.items()), *effects]
 
 
 def _scales(axes, curves):

@@ -9,6 +9,9 @@ import numpy as np
 
 from backdrive_bayes.results import INDICATORS, read_group, read_result
 
+DEFAULT_RATE = 0.05
+"""The default loading rate of the published test [N·m/s]."""
+
 
 @dataclass(eq=False)
 class Saved:
@@ -31,6 +34,13 @@ class Saved:
     def records(self) -> list[dict]:
         """The record objects of indicators.json."""
         return self.indicators["records"]
+
+    @property
+    def main_record(self) -> int:
+        """The record that stands for the unit: of the largest loops the one whose rate is nearest to the default."""
+        widest = max(r["amplitude_Nm"] for r in self.records)
+        near = [i for i, r in enumerate(self.records) if r["amplitude_Nm"] > 0.98 * widest]
+        return min(near, key=lambda i: abs(np.log(self.records[i]["loading_rate_Nm_per_s"] / DEFAULT_RATE)))
 
     def group(self, name: str):
         """A group of the posterior file as an xarray dataset, read once."""

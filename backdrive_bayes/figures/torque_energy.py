@@ -9,32 +9,38 @@ from backdrive_bayes.figures.style import BLACK, BLUE, MJ_PER_J, few_ticks, new_
 
 CAPTION = (
     "Torque–energy curve: energy dissipated per unit of torque, median and interval, with the ranges W1 "
-    "(|τ| ≤ τ₁), W2 (τ₁ < |τ| ≤ τ₂) and W3 (beyond τ₂)."
+    "(|τ| ≤ τ₁), W2 (τ₁ < |τ| ≤ τ₂) and W3 (beyond τ₂, up to the amplitude also where only low torques are shown)."
 )
 ZOOM_BELOW = 0.25
-"""Where τ₂ lies below this share of the amplitude, a second row shows the low torques enlarged."""
+"""Where τ₂ lies below this share of the amplitude, the panel shows the low torques only."""
 ZOOM_TAU2 = 3.0
 SHADES = (("W1", "#9A9A9A", "////"), ("W2", "#CFCFCF", ""), ("W3", "#F2F2F2", ""))
 
 
 def draw(saved: Saved, records: list[int]):
     """Curves of the given records in columns, mJ per N·m over |torque| [N·m]."""
-    zoom = any(_tau(saved, r)[1] < ZOOM_BELOW * saved.records[r]["amplitude_Nm"] for r in records)
     with styled():
-        figure = new_figure(3.6 if zoom else 2.7)
-        axes = figure.subplots(1 + zoom, len(records), sharey=True, squeeze=False)
+        figure = new_figure(2.4)
+        axes = figure.subplots(1, len(records), sharey=True, squeeze=False)[0]
         labels = record_labels(saved.records)
-        for column, record in enumerate(records):
-            for row in range(1 + zoom):
-                _curve(axes[row, column], saved, record, row == 1)
+        for panel, record in zip(axes, records, strict=True):
             tau1, tau2 = _tau(saved, record)
-            axes[0, column].set_title(f"{labels[record]}\nτ₁ {tau1:.2g}, τ₂ {tau2:.2g} N·m")
-            axes[-1, column].set_xlabel("|torque| [N·m]")
-        for row in axes:
-            row[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
-        handles, names = axes[0, 0].get_legend_handles_labels()
+            enlarged = draw_curve(panel, saved, record)
+            more = " (low torques)" if enlarged else ""
+            panel.set_title(f"{labels[record]}{more}\nτ₁ {tau1:.2g}, τ₂ {tau2:.2g} N·m")
+            panel.set_xlabel("|torque| [N·m]")
+        axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
+        handles, names = axes[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=len(names))
     return figure
+
+
+def draw_curve(panel, saved: Saved, record: int) -> bool:
+    """Draw the curve of one record; returns whether only low torques are shown."""
+    tau2 = _tau(saved, record)[1]
+    enlarged = tau2 < ZOOM_BELOW * saved.records[record]["amplitude_Nm"]
+    _curve(panel, saved, record, enlarged)
+    return bool(enlarged)
 
 
 def _tau(saved, record):

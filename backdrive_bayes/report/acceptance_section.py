@@ -7,13 +7,16 @@ from pathlib import Path
 from backdrive_bayes.figures.catalogue import caption, verdict_figures
 from backdrive_bayes.figures.style import display_unit, indicator_words, words
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
-from backdrive_bayes.report.numbers import fixed, interval_text, level_text, like_interval, probability_text, significant
+from backdrive_bayes.report.findings import findings_blocks, warned
+from backdrive_bayes.report.numbers import interval_text, level_text, like_interval, probability_text, significant
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import digests, free
 from backdrive_bayes.results import VERDICT, read_result
 
 ON_SUMMARY = 6
 """Limits on the summary page; more follow on the next pages."""
+MOST_NAMES = 3
+"""Effects in no model at hand that the summary names."""
 _TONES = {"accepted": "good", "rejected": "bad", "inconclusive": "caution"}
 _RULE = (
     "JCGM 106:2012. The conformance probability p_c (clause 7) is the posterior probability that the indicator keeps its limit. "
@@ -40,15 +43,27 @@ def chapter(folder: Path) -> Chapter:
         [
             Heading(free(f"{name}: acceptance", 90), 1),
             _banner(verdict),
+            *findings_blocks(verdict),
             _identity(verdict),
             Heading("Limits"),
             *_limits(verdict, ON_SUMMARY),
             Picture(first, caption(first)),
             Signature(["Decided by", "Date", "Signature"]),
         ],
-        [Picture(first, caption(first), spilt=True), *_more(verdict), *pictures, *_risks(verdict), *_structure(verdict)],
+        [Picture(first, caption(first), spilt=True), *_more(verdict), *pictures],
         figures,
+        terms=[
+            Heading("Acceptance"), Paragraph(_RULE), *([Paragraph(_GLOBAL)] if _global(verdict) else []), _basis(verdict),
+        ],  # fmt: skip
+        outcome=", ".join(filter(None, [_outcome(verdict), warned(verdict)])),
+        provisional=not verdict["convergence"]["converged"],
     )
+
+
+def _outcome(verdict):
+    examined = "" if verdict["structure"]["diagnosed"] else ", structure not examined"
+    kept = probability_text(verdict["conformance_probability"])
+    return f"{verdict['verdict'].upper()}; all limits kept with probability {kept}{examined}"
 
 
 def _banner(verdict):
@@ -68,8 +83,23 @@ def _identity(verdict):
         ("Agreed risks", ", ".join(f"{who}'s {_percent(verdict['risk'][who])}" for who in ("consumer", "producer"))),
         ("All limits kept", f"with probability {probability_text(verdict['conformance_probability'])}"),
         ("Limiting", _limiting(verdict)),
+        ("Structure", _examined(verdict["structure"])),
+        *_global(verdict),
     ]
     return Facts([*rows, *([("Data, SHA-256", digests(fit["data_sha256"]))] if fit.get("data_sha256") else [])])
+
+
+def _examined(structure):
+    """What a diagnosis says of the model behind the verdict."""
+    if not structure["diagnosed"]:
+        return "not examined: no diagnosis was given, so that an effect that acts beside the model may hide"
+    left = structure["unknown_probability"]
+    if not left:
+        return "examined by a diagnosis; the models at hand hold what it finds"
+    names = sorted(structure["uncovered"].items(), key=lambda item: -item[1])[:MOST_NAMES]
+    told = ", ".join(f"{free(words(n), 60)} {probability_text(p)}" for n, p in names)
+    more = ", …" if len(structure["uncovered"]) > MOST_NAMES else ""
+    return f"examined by a diagnosis; in no model at hand with probability {probability_text(left)}: {told}{more}"
 
 
 def _limiting(verdict):
@@ -94,10 +124,11 @@ def _limits(verdict, at_most=None):
     lost = any(r["indicator"] == "lost_motion_rad" for r in rows)
     at_k = f" δ is taken at ±kT_r with k = {verdict['k']:g}." if lost else ""
     return [
-        Table(columns, [_limit_cells(r) for r in rows], [1.5, 0, 0.95, 1.4, 0.6, 0.8, 0.85]),
+        Table(columns, [_limit_cells(r) for r in rows], [1.3, 0, 1.05, 1.3, 1.25, 0.85, 0.9]),
         Note(
             f"Median [{level_text(verdict['level'])} interval] of the reducer's own settled loop; p_c: conformance "
-            f"probability.{at_k} Least squares: the classic evaluation's point estimate and where it lies; its branches do not "
+            f"probability, with the specific risks (consumer's if accepted / producer's if rejected).{at_k} "
+            "Least squares: the classic evaluation's point estimate and where it lies; its branches do not "
             f"close at ±T and friction hides in its offset, so that it may differ by more than the interval.{more}"
         ),
     ]
@@ -108,12 +139,16 @@ def _limit_cells(row):
     return [
         [indicator_words(row["indicator"]), _at(row)],
         unit or "–",
-        _limit_text(row, factor),
+        [_limit_text(row, factor), f"guard band {_guard(row, factor)}"],
         interval_text(row, factor),
-        probability_text(row["conformance_probability"]),
+        [probability_text(row["conformance_probability"]), _risk_text(row)],
         row["verdict"],
         _classic(row, factor),
     ]
+
+
+def _risk_text(row):
+    return f"risks {probability_text(row['specific_consumer_risk'])} / {probability_text(row['specific_producer_risk'])}"
 
 
 def _classic(row, factor):
@@ -133,55 +168,25 @@ def _more(verdict):
     return [Heading("All limits"), *_limits(verdict)] if len(verdict["limits"]) > ON_SUMMARY else []
 
 
-def _risks(verdict):
-    columns = ["Indicator", "Unit", "Consumer's risk if accepted", "Producer's risk if rejected", "Guard band"]
-    return [
-        Heading("Risks"),
-        Paragraph(_RULE),
-        Table(columns, [_risk_cells(r) for r in verdict["limits"]], [1.5, 0, 1.0, 1.0, 1.0]),
-        Note("Of n effective draws, probabilities near a half are known to about ±0.5/√n, and none is known below 1/n."),
-        *_global(verdict),
-    ]
-
-
-def _risk_cells(row):
-    factor, unit = display_unit(row["unit"])
+def _guard(row, factor):
+    """The guard band of each limit that the row has."""
     bands = [("below_max", "max"), ("above_min", "min")]
-    guard = " / ".join(significant(row["guard_band"][k], 2, factor) for k, limit in bands if row[limit] is not None)
-    return [
-        [indicator_words(row["indicator"]), _at(row)],
-        unit or "–",
-        probability_text(row["specific_consumer_risk"]),
-        probability_text(row["specific_producer_risk"]),
-        guard,
-    ]
+    return " / ".join(significant(row["guard_band"][k], 2, factor) for k, limit in bands if row[limit] is not None)
 
 
 def _global(verdict):
-    rows = [r for r in verdict["limits"] if r["global"]]
-    if not rows:
-        return []
-    shares = "Accepted / rejected / inconclusive [%]"
-    columns = ["Indicator", "Process (mean ± sd)", "Out of limits", "Consumer's", "Producer's", shares]
-    return [
-        Heading("Global risks of the process"),
-        Paragraph(_GLOBAL),
-        Table(columns, [_global_cells(r) for r in rows], [1.5, 1.2, 0.7, 0.8, 0.8, 1.3]),
-    ]
+    """A fact for each limit that has global risks."""
+    return [("Global risks", _global_text(r)) for r in verdict["limits"] if r["global"]]
 
 
-def _global_cells(row):
+def _global_text(row):
     factor, unit = display_unit(row["unit"])
     found = row["global"]
-    process = found["process"]
-    origin = f"{found['batch_units']} other units" if found["batch_units"] else f"stated, {process['shape']}"
-    shares = " / ".join(fixed(100 * found[k], 1) for k in ("accepted", "rejected", "inconclusive"))
-    return [
-        [indicator_words(row["indicator"]), _at(row)],
-        [f"{_process(process, factor)} {unit}", origin],
-        *(probability_text(found[k]) for k in ("nonconforming", "consumer", "producer")),
-        shares,
-    ]
+    origin = f"{found['batch_units']} other units" if found["batch_units"] else f"stated, {found['process']['shape']}"
+    risks = ", ".join(f"{who}'s {probability_text(found[who])}" for who in ("consumer", "producer"))
+    outside = probability_text(found["nonconforming"])
+    process = f"process {_process(found['process'], factor)} {unit} ({origin})"
+    return f"{indicator_words(row['indicator'])} at {_at(row)}: {risks}; {process}, {outside} out of limits"
 
 
 def _process(process, factor):
@@ -190,42 +195,22 @@ def _process(process, factor):
     return f"{like_interval(process['mean'], spread, factor)} ± {like_interval(process['sd'], spread, factor)}"
 
 
-def _structure(verdict):
-    structure = verdict["structure"]
-    rows = [[_model(m), probability_text(m["probability"])] for m in structure["models"]]
-    rows += [[f"in no model at hand: {free(words(n))}", probability_text(p)] for n, p in structure["uncovered"].items()]
-    weighed = structure["diagnosed"] or len(rows) > 1
-    told = (
-        "Probabilities of the models that were averaged, with those of effects that a gap diagnosis found and no model holds."
-        if weighed
-        else f"One model only: {rows[0][0]}. No gap diagnosis was given, so nothing here tells how probable it is: "
-        "an effect that acts beside it may hide."
-    )
-    found = verdict["convergence"]
-    sampling = "The sampling converged" if found["converged"] else "The sampling has NOT converged"
-    return [
-        Heading("Models"),
-        Paragraph(told),
-        *([Table(["Model", "Probability"], rows, [3, 1])] if weighed else []),
-        Note(
-            f"{sampling}: largest R-hat {significant(found['max_rhat'], 4)}, smallest tail ESS "
-            f"{significant(found['min_tail_ess'], 4)}."
-        ),
-        *_reproduction(verdict["reproduction"]),
-    ]
+def _basis(verdict):
+    """Models, convergence and reproduction of a verdict in a note."""
+    found, fit = verdict["convergence"], verdict["reproduction"]
+    models = "; ".join(f"{_model(m)} {probability_text(m['probability'])}" for m in verdict["structure"]["models"])
+    sampling = "converged" if found["converged"] else "NOT converged"
+    numbers = f"largest R-hat {significant(found['max_rhat'], 4)}, smallest tail ESS {significant(found['min_tail_ess'], 4)}"
+    made = "".join(f" {name}: {_text(fit[key])}." for name, key in _REPRODUCTION if fit.get(key) is not None)
+    return Note(f"{free(verdict['unit'], 80)}. Model: {models}; {sampling}: {numbers}.{made}")
 
 
 def _model(model):
     return " + ".join(free(words(m)) for m in [*model["modules"], *model["effects"]])
 
 
-def _reproduction(fit):
-    rows = [(name, _text(fit[key])) for name, key in _REPRODUCTION if fit.get(key) is not None]
-    return [Heading("Reproduction"), Facts(rows)] if rows else []
-
-
 def _text(value):
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-_REPRODUCTION = (("Seed", "seed"), ("Software", "versions"), ("Data, SHA-256", "data_sha256"))
+_REPRODUCTION = (("Seed", "seed"), ("Data, SHA-256", "data_sha256"))

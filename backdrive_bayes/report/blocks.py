@@ -123,8 +123,8 @@ class Contents(Block):
 class Chapter:
     """What one result contributes: a summary of one page, ``pages`` that follow it, details for the appendix, and figures.
 
-    ``outcome`` is its one line on the overview, ``about`` what the overview knows of its unit. A ``provisional`` chapter carries a
-    watermark and is not to be signed.
+    ``outcome`` is its one line on the overview, ``about`` what the overview knows of its unit, ``terms`` what the report's last
+    section says once for all chapters alike. A ``provisional`` chapter carries a watermark and is not to be signed.
     """
 
     title: str
@@ -135,3 +135,4 @@ class Chapter:
     outcome: str = ""
     provisional: bool = False
     about: About | None = None
+    terms: list[Block] = field(default_factory=list)

@@ -11,8 +11,8 @@ from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import free
 
 _LETTER = re.compile(r"\b([A-Za-z]\w*)\.[A-Za-z]")
-MOST_NUMBERS = 3
-"""Numbers behind a claim that are printed; all are in comparison.json."""
+MOST_NUMBERS = 1
+"""Numbers behind a claim that are printed; all are in comparison.json, with the predicates."""
 
 
 def claims(result) -> list:
@@ -28,15 +28,16 @@ def claims(result) -> list:
         *_origins(result),
         Table(_COLUMNS, [_row(c) for c in found["claims"]], _WIDTHS),
         Note(
-            f"“Holds” from a probability of {found['holds_from']:g}, “does not hold” up to {found['fails_below']:g}, “open” "
-            "between. Numbers: median [90 % interval] at the first rate asked; of a series the medians at its ends and its "
-            "largest. Loops of amplitudes that were not measured are predictions, widened by the error that measured ones show."
+            f"✓ holds, from a probability of {found['holds_from']:g}; ✗ does not hold, up to {found['fails_below']:g}; – "
+            "open between, or not answered. Numbers: median [90 % interval] at the first rate asked, of a series the medians at its "
+            "ends and its largest; all of them, with the predicates, are in comparison.json."
         ),
     ]
 
 
-_COLUMNS = ["No.", "Claim and predicate", "Numbers behind it", "Probability", "Verdict"]
-_WIDTHS = [0, 2.5, 1.9, 0.7, 0.8]
+_COLUMNS = ["No.", "Claim", "Numbers behind it", "", "Verdict"]
+_WIDTHS = [0, 2.6, 1.75, 0, 1.25]
+_TICKS = {"holds": "✓", "does not hold": "✗"}
 NOTHING = 1e-6
 """Beside the largest of a series, values below this share of it are nothing."""
 
@@ -66,19 +67,17 @@ _SAID = {
 
 
 def _row(claim):
-    probability = "–" if claim["probability"] is None else probability_text(claim["probability"])
-    note = f" ({free(claim['note'])})" if claim["note"] else ""
-    asked = [sentence(claim["claim"]), sentence(claim["asked"] + note, 900)]
-    return [free(claim["id"], 8), asked, _numbers(claim), probability, claim["verdict"]]
+    said = claim["verdict"]
+    if claim["probability"] is not None:
+        said = f"{said}, {probability_text(claim['probability'])}"
+    return [free(claim["id"], 8), sentence(claim["claim"]), _numbers(claim), _TICKS.get(claim["verdict"], "–"), said]
 
 
 def _numbers(claim):
     found = claim["numbers"]
     shown = [n for n in found if n["at"] == found[0]["at"]][:MOST_NUMBERS]
-    texts = "; ".join(_whose(n) + _number(n) for n in shown) or "–"
-    left = len(found) - len(shown)
-    texts += f"; {left} more in comparison.json" if left else ""
-    return [texts, sentence(claim["reason"])] if claim["reason"] else texts
+    texts = "; ".join(_whose(n) + _number(n) for n in shown)
+    return texts or sentence(claim["reason"]) or "–"
 
 
 def _whose(number):

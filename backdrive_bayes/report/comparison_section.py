@@ -8,6 +8,7 @@ from backdrive_bayes.figures.catalogue import caption, comparison_figures
 from backdrive_bayes.figures.style import indicator_words, shown_unit
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.claims_section import claims
+from backdrive_bayes.report.findings import findings_blocks, warned
 from backdrive_bayes.report.numbers import interval_text, level_text, probability_text
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import Free, digests, free
@@ -24,13 +25,14 @@ def chapter(folder: Path) -> Chapter:
     figures = comparison_figures(result)
     level = result["level"]
     title = free("Comparison: " + ", ".join(result["names"]), 110)
-    on_summary = [n for n in ("comparison-loops",) if n in figures]
-    rest = [Picture(n, caption(n, level), floats=True) for n in figures if n not in on_summary and n != "comparison-mechanism"]
+    on_summary = [n for n in ("comparison-loops", "comparison-mechanism") if n in figures]
+    rest = [Picture(n, caption(n, level)) for n in figures if n.startswith("comparison-ratios")]
     return Chapter(
         title,
         [
             Heading(title, 1),
             _banner(result),
+            *findings_blocks(result),
             _identity(result),
             *_key_tables(result),
             *(Picture(n, caption(n, level)) for n in on_summary),
@@ -38,17 +40,26 @@ def chapter(folder: Path) -> Chapter:
         ],
         [
             *(Picture(n, caption(n, level), spilt=True) for n in on_summary),
-            Heading("How each unit releases energy"),
-            Picture("comparison-mechanism", caption("comparison-mechanism", level)),
-            *_mechanism(result),
             *rest,
-            *_all_tables(result),
             *_refused(result),
-            *claims(result),
             *_reproduction(result),
         ],
         figures,
+        pages=claims(result),
+        outcome=", ".join(filter(None, [_outcome(result), warned(result)])),
+        provisional=not _usable(result),
     )
+
+
+def _outcome(result):
+    rows = [r for p in result["pairs"] for c in p["conditions"] for r in c["indicators"].values()]
+    clear = sum(r["verdict"] in ("greater", "less") for r in rows)
+    text = f"{clear} of {len(rows)} differences are clear"
+    if not result["converged"]:
+        text = f"INCONCLUSIVE in part; {text}" if len(_usable(result)) > 1 else "INCONCLUSIVE"
+    found = (result["claims"] or {}).get("claims", [])
+    counts = [f"{sum(c['verdict'] == v for c in found)} {v}" for v in ("holds", "does not hold", "open") if found]
+    return f"{text}; claims: {', '.join(counts)}" if found else text
 
 
 def _banner(result):
@@ -144,35 +155,6 @@ def _ratio_cell(row, factor, unit):
     return [interval_text(row["difference"], factor), f"difference [{unit or '–'}]"]
 
 
-def _all_tables(result):
-    blocks = []
-    for pair in result["pairs"]:
-        for condition in pair["conditions"]:
-            predicted = f", predicted for {free(', '.join(condition['predicted']))}" if condition["predicted"] else ""
-            title = f"{free(pair['first'], 40)} and {free(pair['second'], 40)} at {_at(condition)}{predicted}"
-            blocks += [Heading(title), _table(pair, condition, list(condition["indicators"]))]
-            if condition["not_compared"]:
-                why = "; ".join(f"{indicator_words(n)}: {sentence(t)}" for n, t in condition["not_compared"].items())
-                blocks.append(Note(f"Not compared: {why}."))
-    return [*blocks, Note(_legend(result))] if blocks else []
-
-
-def _mechanism(result):
-    keys = ("S_g_over_S", "S_f_over_S", "rest_over_S", "elastic_share")
-    rows = [
-        [[free(m["unit"], 40), _at(r)], *(interval_text(r[k]) for k in keys)]
-        for m in result["mechanism"]
-        for r in m["records"]
-    ]
-    return [
-        Table(["Unit", "S_g/S [–]", "S_f/S [–]", "effects/S [–]", "given back/W_abs [–]"], rows, [1.1, 1.1, 1.1, 1.1, 1.15]),
-        Note(
-            "S_g, S_f: energy that geometric error and friction dissipate in a cycle. Given back: (W_abs − S)/W_abs, stored "
-            f"elastically. Medians with {level_text(result['level'])} intervals."
-        ),
-    ]
-
-
 def _refused(result):
     rows = [
         [free(r["unit"], 40), free(r["record"], 60), free(r["against"], 40), sentence(r["reason"])]
@@ -189,8 +171,7 @@ def _refused(result):
 
 
 def _reproduction(result):
-    rows = []
-    for name, fit in zip(result["names"], result["reproduction"], strict=True):
-        rows.append((free(name, 24), f"seed {fit.get('seed', '–')}; data SHA-256 {digests(fit.get('data_sha256') or '–')}"))
+    fits = zip(result["names"], result["reproduction"], strict=True)
+    rows = [f"{free(n, 24)}: seed {f.get('seed', '–')}, data SHA-256 {digests(f.get('data_sha256') or '–')}" for n, f in fits]
     versions = sorted({str(f["versions"]) for f in result["reproduction"] if "versions" in f})
-    return [Heading("Reproduction"), Facts([*rows, *(("Software", v) for v in versions)])]
+    return [Note(f"Reproduction. {'; '.join([*rows, *versions])}. All conditions and indicators are in comparison.json.")]

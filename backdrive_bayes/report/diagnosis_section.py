@@ -10,9 +10,9 @@ from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import label_words
 from backdrive_bayes.figures.style import words
 from backdrive_bayes.report import diagnosis_tables as tables
-from backdrive_bayes.report.blocks import Banner, Block, Chapter, Facts, Heading, Paragraph, Picture, Signature
-from backdrive_bayes.report.diagnosis_text import TERMS, next_test, verdict
-from backdrive_bayes.report.numbers import level_text
+from backdrive_bayes.report.blocks import Banner, Block, Chapter, Facts, Heading, Picture, Signature
+from backdrive_bayes.report.diagnosis_text import TERMS, next_test, outcome, verdict
+from backdrive_bayes.report.findings import findings_blocks, warned
 from backdrive_bayes.report.text import Free, free
 
 LISTED = 4
@@ -30,18 +30,21 @@ def chapter(folder: Path) -> Chapter:
         [
             Heading(title, 1),
             Banner(*verdict(saved)),
+            *findings_blocks(saved.result),
             _identity(saved),
             *(Picture(*about) for about in overview),
             Signature(["Reviewed by", "Date", "Signature"]),
         ],
         [*(Picture(*about, spilt=True) for about in overview), *_details(saved, figures)],
         figures,
+        outcome=", ".join(filter(None, [outcome(saved), warned(saved.result)])),
+        terms=[Heading("Diagnosis"), Facts(TERMS)] if saved.result["which"] else [],
+        provisional=not (saved.result.get("convergence") or {"converged": True})["converged"],
     )
 
 
 def _identity(saved):
     rows = [
-        ("Unit", free(saved.result["unit"])),
         ("Baseline", free(" + ".join(words(m) for m in saved.result.get("baseline") or []) or "not recorded")),
         ("Records", _record_list(saved)),
         ("Gap", tables.gap_text(saved)),
@@ -49,13 +52,11 @@ def _identity(saved):
     ]
     if saved.shrink:
         rows.append(("Held out", free(tables.held_out_text(saved))))
-    level = level_text(saved.level)
-    return Facts([*rows, ("Intervals", f"central {level} credible intervals, written median [low, high]")])
+    return Facts(rows)
 
 
 def _record_list(saved):
-    tips = [f" (±{r['amplitude_Nm']:.3g} N·m)" for r in saved.records]
-    records = [x if "±" in x else x + tip for x, tip in zip(saved.labels, tips, strict=True)]
+    records = saved.labels
     more = f"; and {len(records) - LISTED} more" if len(records) > LISTED else ""
     return free(f"{len(records)}: {'; '.join(records[:LISTED])}{more}", 600)
 
@@ -64,17 +65,14 @@ def _details(saved, figures) -> list[Block]:
     def pictures(kind):
         return [Picture(n, caption(n, saved.level)) for n in figures if n == kind or n.startswith(f"{kind}-")]
 
+    # The map stands on the summary already, unless that had no room for all records.
+    mapped = pictures("gap-map") if len(saved.records) > len(diagnosis.mapped(saved)) else []
     parts = (
-        ("Which effect", [*tables.probabilities(saved), *tables.effect_parameters(saved)]),
-        ("Where the gap lies", [*_summary(saved), *pictures("gap-map"), *pictures("gap-residual")]),
-        ("How far it shrinks", [*tables.shrink(saved), *pictures("closed-fraction")]),
-        ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved), *pictures("parameter-shift")]),
+        ("Which effect", [*tables.probabilities(saved), *tables.effect_parameters(saved)] if saved.effects else []),
         ("Next test", next_test(saved)),
-        ("Convergence", tables.convergence(saved)),
-        ("Terms", [Facts(TERMS)] if saved.result["which"] else []),
+        ("How far it shrinks", tables.shrink(saved)),
+        ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved)]),
+        ("", tables.convergence(saved) if saved.effects else []),
+        ("Where the gap lies", [*mapped, *pictures("gap-residual")[:1]] if saved.effects else []),
     )
-    return [b for name, blocks in parts if blocks for b in (Heading(name), *blocks)]
-
-
-def _summary(saved):
-    return [Paragraph(free(saved.summary, 600))] if saved.summary else []
+    return [b for name, blocks in parts if blocks for b in (*([Heading(name)] if name else []), *blocks)]

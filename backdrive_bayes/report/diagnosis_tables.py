@@ -13,13 +13,15 @@ from backdrive_bayes.figures.diagnosis_words import (
     signed,
 )
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, shown_unit
-from backdrive_bayes.report.blocks import Note, Table
+from backdrive_bayes.report.blocks import Note, Paragraph, Table
 from backdrive_bayes.report.fit_tables import INDICATORS
 from backdrive_bayes.report.numbers import decimals, fixed, interval_text, level_text, significant
 from backdrive_bayes.report.text import free
 
 TOP = 6
-MOST_PARAMETERS = 30
+MOST_PARAMETERS = 12
+MOVED = 1.0
+"""Own standard deviations from which on a shift is worth a line."""
 
 
 def _arcmin(value):
@@ -50,14 +52,12 @@ def held_out_text(saved: Diagnosed) -> str:
 
 
 def probabilities(saved: Diagnosed) -> list:
-    """The most probable hypotheses, "unknown" and "none"."""
+    """The most probable hypotheses, "unknown" and "none", in a sentence."""
     if not saved.result["which"]:
         return []
-    lines = [
-        [free(hypothesis_words(h), 90), probability_text(h.probability), "yes" if h.in_set else "–"] for h in saved.ranked(TOP)
-    ]
-    note = Note("Probabilities of all hypotheses sum to 1. A name with + stands for two effects at once.")
-    return [Table(["Hypothesis", "Probability", "In the 90 % credible set"], lines, [2.2, 0.8, 1.2]), note]
+    told = [f"{free(hypothesis_words(h), 90)} {probability_text(h.probability)}" for h in saved.ranked(TOP)]
+    text = "Probabilities of the hypotheses, which sum to 1 (a name with + stands for effects at once)"
+    return [Paragraph(f"{text}: {'; '.join(told)}.")]
 
 
 def effect_parameters(saved: Diagnosed) -> list:
@@ -96,8 +96,8 @@ def shrink(saved: Diagnosed) -> list:
         lines.append(["Gaussian process (control)", "–", "–", "–", share_text(control)])
     columns = ["Held out", "before [arcmin]", "after [arcmin]", "noise floor [arcmin]", "closed fraction"]
     note = Note(
-        "Root mean square of measured minus predicted angle of what the fit has not seen, before and after the effect is added "
-        f"to the model. Closed fraction with its {level_text(saved.level)} interval (Bayesian bootstrap over what is left out)."
+        "Rms of measured minus predicted angle on held-out data, without and with the effect. Closed fraction with its "
+        f"{level_text(saved.level)} interval."
     )
     return [Table(columns, lines, [1.5, 1, 1, 1.2, 1.3]), note]
 
@@ -116,8 +116,7 @@ def indicators(saved: Diagnosed) -> list:
     at = saved.shrink.get("indicators_at")
     where = f" at {at['loading_rate_Nm_per_s']:.3g} N·m/s and ±{at['amplitude_Nm']:.3g} N·m" if at else ""
     note = Note(
-        f"Median [{level_text(saved.level)} interval] of the reducer{where}, without and with the effect in the model; the "
-        "change is that of the median."
+        f"Median [{level_text(saved.level)} interval] of the reducer{where}, without and with the effect in the model."
     )
     return [Table(["Indicator", "Unit", "Before", "After", "Change"], lines, [1.6, 0.6, 1.3, 1.3, 0.7]), note]
 
@@ -130,17 +129,23 @@ def _change(before, after, factor):
 
 
 def parameter_shift(saved: Diagnosed) -> list:
-    """The baseline's parameters before and after, largest shift first."""
+    """The baseline's parameters that move by a standard deviation or more, largest shift first."""
     lines = []
-    for shift in saved.shifts[:MOST_PARAMETERS]:
+    for shift in [s for s in saved.shifts if abs(s["shift_sd"] or 0.0) >= MOVED][:MOST_PARAMETERS]:
         factor, unit = shown_unit(shift["unit"], [shift[k]["median"] for k in ("before", "after")])
         intervals = (interval_text(shift[k], factor) for k in ("before", "after"))
         lines.append(
             [free(parameter_words(saved, shift["parameter"]), 60), free(unit or "–", 20), *intervals, signed(shift["shift_sd"])]
         )
+    if not lines:
+        still = "No parameter of the reducer moves by as much as its own standard deviation when the effect is added."
+        return [Note(still)] if saved.shifts else []
     columns = ["Parameter", "Unit", "Before", "After", "Shift [own sd]"]
-    note = Note(f"Median [{level_text(saved.level)} interval] without and with the effect in the model; sd: standard deviations.")
-    return [Table(columns, lines, [1.5, 0.8, 1.2, 1.2, 0.95]), note] if lines else []
+    note = Note(
+        f"Median [{level_text(saved.level)} interval] without and with the effect in the model, of the parameters that move by "
+        "at least one of their own standard deviations (sd)."
+    )
+    return [Table(columns, lines, [1.5, 0.8, 1.2, 1.2, 0.95]), note]
 
 
 def convergence(saved: Diagnosed) -> list:
@@ -148,7 +153,8 @@ def convergence(saved: Diagnosed) -> list:
     found = saved.result.get("convergence")
     if not found:
         return []
-    numbers = [fixed(found.get("max_rhat"), 4), *(fixed(found.get(k), 0) for k in ("min_bulk_ess", "min_tail_ess"))]
-    line = ["yes" if found["converged"] else "NO", *numbers, free(parameter_words(saved, str(found.get("worst", "–"))), 60)]
-    columns = ["Converged", "largest R-hat", "smallest bulk ESS", "smallest tail ESS", "slowest quantity"]
-    return [Table(columns, [line], [0.8, 0.9, 1.1, 1.1, 1.8])]
+    said = "Converged" if found["converged"] else "NOT converged"
+    sizes = ", ".join(f"{n} {fixed(found.get(f'min_{n}_ess'), 0)}" for n in ("bulk", "tail"))
+    slowest = free(parameter_words(saved, str(found.get("worst", "–"))), 60)
+    rhat = fixed(found.get("max_rhat"), 4)
+    return [Note(f"{said}: largest R-hat {rhat}, smallest ESS {sizes}; slowest quantity: {slowest}.")]

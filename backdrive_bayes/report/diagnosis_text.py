@@ -9,16 +9,17 @@ from backdrive_bayes.report.blocks import Facts, Paragraph
 from backdrive_bayes.report.numbers import significant
 from backdrive_bayes.report.text import Free, free
 
+LEAST_BITS = 0.005
+"""A test that is expected to tell less is not proposed."""
 TERMS = [
-    ("Gap", "what the baseline leaves of the measured angle beyond the noise and beyond its own small misfit"),
+    ("Gap", "what the baseline leaves of the measured angle beyond the noise"),
     ("Noise floor", "rms that the noise of the measured angle and torque alone would leave"),
-    ("Probability", "posterior probability of each hypothesis, the baseline's parameters re-fitted with each"),
+    ("Probability", "posterior probability of each hypothesis; how it is found stands above"),
     ("unknown", "something is missing that no effect in the list explains; modules left out of the baseline keep their name"),
     ("none", "the baseline explains the data to the noise"),
     ("90 % credible set", "the most probable hypotheses that together hold at least 90 %"),
-    ("Closed fraction", "share of the gap above the noise that vanishes on data left out of the fit; 100 %: down to the noise"),
+    ("Closed fraction", "share of the gap above the noise that vanishes on held-out data; 100 %: down to the noise"),
     ("Gaussian process", "a residual curve free to bend anywhere, as a control: it closes a gap without naming a cause"),
-    ("loading, unloading", "torque running away from zero, and back to zero"),
 ]
 """What the words of this chapter mean."""
 
@@ -40,15 +41,25 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
     return "caution", f"{found}, {_standing(saved, rivals)}", text
 
 
+def outcome(saved: Diagnosed) -> str:
+    """One line for an overview."""
+    if saved.inconclusive or not saved.effects:
+        return answer_words(saved)
+    closed = saved.shrink.get("closed_fraction")
+    share = f"; closes {share_text(closed)} of the gap on held-out data" if closed and saved.effects != ["unknown"] else ""
+    rivals = len(saved.credible_set) - 1
+    return f"{answer_words(saved)}{share}{f'; {rivals} rivals in the 90 % set' if rivals > 0 else ''}"
+
+
 def _standing(saved, rivals):
     if rivals:
         return "CAUSES STILL CONFUSABLE"
-    if not _foretold(saved):
+    if not _closes(saved):
         return "THE NAME IN DOUBT"
     return "PART OF THE CAUSE NAMED" if more_words(saved) else "CAUSE NAMED"
 
 
-def _foretold(saved):
+def _closes(saved):
     """Whether what is named takes anything off the gap on held-out data, as far as that was judged.
 
     Jumps show in finer blocks than those that are held out.
@@ -73,18 +84,18 @@ def _closed(saved):
     share = share_text(saved.shrink["closed_fraction"])
     if saved.effects == ["unknown"]:
         return f"The best listed candidate closes {share} of the gap on held-out data."
-    doubt = "" if _foretold(saved) else ": it foretells nothing of what it is named for"
+    doubt = "" if _closes(saved) else ", so it predicts nothing of what it is named for"
     return f"Added to the model, it closes {share} of the gap on held-out data{doubt}."
 
 
 def next_test(saved: Diagnosed) -> list:
     """The measurement that would best tell what is still confusable; empty where none is proposed."""
     test = saved.result.get("next_test")
-    if not test:
+    if not test or (test.get("expected_entropy_drop_bits") or 1.0) < LEAST_BITS:
         return []
     rows = [("Separates", free(", ".join(label_words(e) for e in test.get("separates") or []) or "not recorded"))]
     if test.get("expected_entropy_drop_bits") is not None:
         drop = significant(test["expected_entropy_drop_bits"], 2)
         rows.append(("Expected gain", f"{drop} bit less uncertainty about the cause"))
-    todo = in_words(str(test.get("do") or "").strip())
+    todo = in_words(str(test.get("do") or "").strip()).replace(" or: ", "; or, equally informative: ")
     return [Paragraph(free(todo[:1].upper() + todo[1:], 600)), Facts(rows)]

@@ -15,21 +15,21 @@ from backdrive_bayes.report.blocks import (
     Chapter,
     Facts,
     Heading,
-    Paragraph,
+    Note,
     Picture,
     Signature,
 )
 from backdrive_bayes.report.classic_tables import least_squares
 from backdrive_bayes.report.findings import findings_blocks, warned
 from backdrive_bayes.report.numbers import fixed, level_text
-from backdrive_bayes.report.parameter_tables import parameters
+from backdrive_bayes.report.parameter_tables import meanings, parameters
 from backdrive_bayes.report.text import digests, free
 
 ON_SUMMARY = 2 * PER_FIGURE
 """Records whose indicators fit on the summary page."""
-LEFT_OUT = ("predictive",)
+LEFT_OUT = ("predictive", "torque-energy", "amplitude")
 """Figures that stand in the result folder only."""
-FIRST_ONLY = ("modules", "torque-energy")
+FIRST_ONLY = ("loop", "modules")
 """Figures of which the report shows the first; those of further records stand in the result folder."""
 
 
@@ -57,6 +57,7 @@ def chapter(folder: Path) -> Chapter:
         figures,
         outcome=", ".join(filter(None, [_outcome(saved), warned(saved.indicators)])),
         provisional=not converged,
+        terms=[Heading("Parameters and sampling"), Note(meanings(saved)), Note(tables.CRITERIA)],
         about=_about(saved),
     )
 
@@ -129,36 +130,30 @@ def _record_list(records):
 def _details(saved, figures) -> list[Block]:
     level = saved.indicators["level"]
 
-    def pictures(kind, floats=False):
-        names = [n for n in figures if n == kind or n.startswith(f"{kind}-")]
-        return [Picture(n, caption(n, level), floats=floats) for n in names]
+    def pictures(kind):
+        return [Picture(n, caption(n, level)) for n in figures if n == kind or n.startswith(f"{kind}-")]
 
     more = tables.indicators(saved) if len(saved.records) > ON_SUMMARY else []
     parts = (
-        ("Loops of further records", pictures("loop")),
         ("Indicators of all records", more),
         ("Module decomposition", [*pictures("modules"), *tables.mechanism(saved)]),
-        ("Torque–energy curve", [*pictures("torque-energy"), *tables.humps(saved)]),
-        ("Back-drive", tables.back_drive(saved)),
-        ("Loops of smaller amplitude", [*pictures("amplitude"), *tables.windows(saved)]),
-        ("Parameters", [*parameters(saved), *pictures("corner")]),
-        ("Sampling", [*tables.convergence(saved), *pictures("trace")]),
-        ("Noise and repeatability", tables.noise(saved)),
+        ("Energy and back-drive", [*pictures("energy"), *tables.ranges(saved)]),
+        ("Parameters", parameters(saved)),
         ("Classic least-squares fit", least_squares(saved)),
-        ("Reproduction", _reproduction(saved)),
+        ("Sampling and noise", [*tables.convergence(saved), *tables.noise(saved), *_reproduction(saved)]),
+        ("", [*pictures("trace"), *pictures("corner")]),
     )
-    return [b for name, blocks in parts if blocks for b in (Heading(name), *blocks)]
+    return [b for name, blocks in parts if blocks for b in (*([Heading(name)] if name else []), *blocks)]
 
 
 def _reproduction(saved):
     attributes = saved.attributes()
     if not attributes:
         return []
-    rows = [
-        ("Software", attributes["versions"]),
-        ("Sampler", f"{attributes['inference_library']} {attributes['inference_library_version']}"),
-        ("Seed", str(attributes["seed"])),
-        ("Data, SHA-256", attributes["data_sha256"] or "not recorded"),
-        ("Evaluations", f"{saved.indicators['convergence']['evaluations']} of the marginal posterior density"),
-    ]
-    return [Paragraph("The same data, versions and seed give the same result bit for bit."), Facts(rows)]
+    evaluations = saved.indicators["convergence"]["evaluations"]
+    told = (
+        f"Seed {attributes['seed']}; {evaluations} evaluations of the marginal posterior density by "
+        f"{attributes['inference_library']} {attributes['inference_library_version']}. Software: {attributes['versions']}. "
+        f"Data, SHA-256: {attributes['data_sha256'] or 'not recorded'}."
+    )
+    return [Note(f"Reproduction: the same data, versions and seed give the same result bit for bit. {told}")]

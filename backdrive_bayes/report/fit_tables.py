@@ -60,7 +60,7 @@ def _by_record(saved, columns, cells):
 
 
 def mechanism(saved) -> list:
-    """Areas that the geometric and friction modules enclose, and what a load turns and stores."""
+    """Areas that the geometric and friction modules enclose."""
 
     def split(r):
         m = r["mechanism"]
@@ -77,19 +77,22 @@ def mechanism(saved) -> list:
     ]
 
 
-def back_drive(saved) -> list:
-    """What a load turns and stores."""
+def ranges(saved) -> list:
+    """Bounds of the ranges W1, W2 and W3, and what a load turns and stores."""
+    found = [r["torque_energy"].get(key) for r in saved.records for key in _HUMP]
+    factor, unit = shown_unit("N·m", [f["median"] for f in found if f])
 
     def cells(r):
         b = r["back_drive"]
-        angle, energy = interval_text(b["theta_L_rad"], ARCMIN_PER_RAD), interval_text(b["W_L_J"], MJ_PER_J)
-        return [significant(b["load_Nm"]), angle, energy]
+        bounds = [interval_text(r["torque_energy"][key], factor) for key in _HUMP]
+        return [*bounds, interval_text(b["theta_L_rad"], ARCMIN_PER_RAD), interval_text(b["W_L_J"], MJ_PER_J)]
 
     return [
-        _by_record(saved, ["load τ_L [N·m]", "angle θ_L [arcmin]", "energy W_L [mJ]"], cells),
+        _by_record(saved, [f"τ₁ [{unit}]", f"τ₂ [{unit}]", "θ_L [arcmin]", "W_L [mJ]"], cells),
         Note(
-            f"{_interval(saved)} Angle turned and energy absorbed when the load arrives at zero torque on the rising branch of "
-            "the settled loop."
+            f"{_interval(saved)} τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's "
+            "convention). θ_L, W_L: angle turned and energy absorbed when a load as large as the amplitude arrives at zero "
+            "torque on the rising branch of the settled loop."
         ),
         *_loads(saved),
     ]
@@ -126,61 +129,23 @@ def _interval(saved):
     return f"Median [{level_text(saved.indicators['level'])} interval]."
 
 
-def humps(saved) -> list:
-    """Bounds of the ranges W1, W2 and W3."""
-
-    found = [r["torque_energy"].get(key) for r in saved.records for key in _HUMP]
-    factor, unit = shown_unit("N·m", [f["median"] for f in found if f])
-
-    def cells(r):
-        ranges = [interval_text(r["torque_energy"][key], factor) for key in _HUMP]
-        return [*ranges, significant(r["amplitude_Nm"], factor=factor)]
-
-    return [
-        _by_record(saved, [f"τ₁ [{unit}]", f"τ₂ [{unit}]", f"amplitude T [{unit}]"], cells),
-        Note(
-            f"{_interval(saved)} τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's "
-            "convention)."
-        ),
-    ]
-
-
-def windows(saved) -> list:
-    """Extremes and means of S over windows cut out of the measured loop; nothing where they were not saved."""
-    found = _over_positions(saved, "windowed", "Windows |τ| ≤ t", _WINDOWED)
-    return [*found, Note(f"{_interval(saved)} Windows are cut out of the measured loop, over all t up to the amplitude.")] if found else []
-
-
-def _over_positions(saved, key, title, quantities):
-    records = [(label, r[key]) for label, r in zip(record_labels(saved.records), saved.records, strict=True) if r.get(key)]
-    blocks = []
-    for part in parts(records, PER_FIGURE):
-        rows = [[name, *(interval_text(own.get(q), factor) for _, own in part)] for q, name, factor in quantities]
-        blocks.append(Table([title, *(label for label, _ in part)], rows, [1.0, *[1.1] * len(part)]))
-    return blocks
-
-
 _HUMP = ("tau1_Nm", "tau2_Nm")
-_WINDOWED = (("max_S_J", "S max [mJ]", MJ_PER_J), ("mean_S_J", "S mean [mJ]", MJ_PER_J))
-
-
 def noise(saved) -> list:
-    """Noise levels of each record."""
+    """Noise levels in a sentence, as their range over the records."""
 
-    def cells(r):
-        n = r["noise"]
-        angles = [significant(n[k], 2, ARCMIN_PER_RAD) for k in ("white_rad", "correlated_rad")]
-        return [*angles, significant(n["correlation_time_s"], 2, 1e3), significant(n["torque_Nm"], 2, 1e3)]
+    def span(key, factor):
+        values = [r["noise"][key] for r in saved.records]
+        ends = [significant(v, 2, factor) for v in (min(values), max(values))]
+        return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
     jitter = saved.indicators["jitter"]
     size, length = (significant(jitter[k], 2, 1e3) for k in ("torque_Nm", "length_Nm"))
     return [
-        _by_record(
-            saved, ["white [arcmin]", "correlated [arcmin]", "corr. time [ms]", "torque [mN·m]"], cells
-        ),
         Note(
-            f"Standard deviations. Crossing torques repeat to {size} mN·m (standard deviation, correlated over {length} mN·m)."
-        ),
+            f"Noise, as standard deviations: angle {span('white_rad', ARCMIN_PER_RAD)} arcmin white and "
+            f"{span('correlated_rad', ARCMIN_PER_RAD)} arcmin correlated over {span('correlation_time_s', 1e3)} ms, torque "
+            f"{span('torque_Nm', 1e3)} mN·m. Crossing torques repeat to {size} mN·m, correlated over {length} mN·m."
+        )
     ]
 
 
@@ -192,22 +157,17 @@ def quantity_name(saved, name: str) -> str:
     return free(words(name))
 
 
+CRITERIA = (
+    "Convergence: rank-normalised split R-hat and effective sample sizes (ESS) over independent ensembles, for every log scale "
+    "and indicator. Converged means R-hat below 1.01 and both ESS at least 400 for all of them, and no contradiction with the "
+    "measured cycles."
+)
+
+
 def convergence(saved) -> list:
-    """Convergence numbers."""
+    """Convergence numbers in a sentence."""
     found = saved.indicators["convergence"]
-    row = [
-        "yes" if found["converged"] else "NO",
-        fixed(found["max_rhat"], 4),
-        fixed(found["min_bulk_ess"], 0),
-        fixed(found["min_tail_ess"], 0),
-        quantity_name(saved, found.get("worst", "–")),
-    ]
-    columns = ["Converged", "largest R-hat", "smallest bulk ESS", "smallest tail ESS", "slowest quantity"]
-    return [
-        Table(columns, [row], [0.8, 0.9, 1.1, 1.1, 1.8]),
-        Note(
-            "Rank-normalised split R-hat and effective sample sizes (ESS) over independent ensembles, for "
-            "every scale and indicator. Converged means R-hat below 1.01 and both ESS at least 400 for "
-            "all of them, and no contradiction with the measured cycles."
-        ),
-    ]
+    said = "Converged" if found["converged"] else "NOT converged"
+    slowest = quantity_name(saved, found.get("worst", "–"))
+    numbers = f"bulk {fixed(found['min_bulk_ess'], 0)}, tail {fixed(found['min_tail_ess'], 0)}"
+    return [Note(f"{said}: largest R-hat {fixed(found['max_rhat'], 4)}, smallest ESS {numbers}; slowest quantity: {slowest}.")]

@@ -84,7 +84,7 @@ def _data(found, room: Path, title: str, written: str) -> dict:
 
     def placed(chapter, i):
         parts = {n: [_placed(b.data(), chapter, i, room) for b in getattr(chapter, n)] for n in ("summary", "pages", "details")}
-        if len(found) > 1 and parts["details"]:
+        if len(found) > 1 and any(not (b["kind"] == "picture" and b["spilt"]) for b in parts["details"]):
             parts["details"].insert(0, Heading(free(f"Appendix: {chapter.title}", 110), 1).data())
         # Nobody signs what is provisional.
         unsigned = [b for b in parts["summary"] if b["kind"] != "signature"]
@@ -99,8 +99,19 @@ def _data(found, room: Path, title: str, written: str) -> dict:
         "author": f"backdrive-bayes {version('backdrive-bayes')}",
         "overview": [b.data() for b in overview_blocks(found, title, written)] if len(found) > 1 else [],
         "chapters": [placed(c, i) for i, c in enumerate(found)],
-        "method": [b.data() for b in method_blocks()],
+        "method": [b.data() for b in method_blocks(_by_heading([b for c in found for b in c.terms]))],
     }
+
+
+def _by_heading(blocks):
+    """The blocks of all chapters under their headings, each told once."""
+    groups, heading = {}, None
+    for block in blocks:
+        heading = block if block.kind == "heading" else heading
+        own = groups.setdefault(heading, [])
+        if block not in own:
+            own.append(block)
+    return [b for own in groups.values() for b in own]
 
 
 def _placed(block, chapter, i, room):
