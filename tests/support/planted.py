@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise, physical_reducer, ramp
+from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, angle_noise, physical_reducer, ramp
 from backdrive_bayes.records.record import Record, Unit
 
 NOISE = BenchNoise()
@@ -14,9 +14,25 @@ HERTZ = 400.0
 SCALE = 0.1
 
 
-def planted(seed=0, *, offset_nm=0.0, lag_s=0.0, jitter=None, loops=LOOPS, noise=NOISE, **options) -> Unit:
+def smooth_reducer(extra=None) -> KnownReducer:
+    """A reducer whose plays turn up to full load, so that its loading branch has one step and no shoulder.
+
+    ``extra`` is (angle in angle scales, lowest and highest torque in shares) of a further step with drag.
+    """
+    known = physical_reducer(np.random.default_rng(0), scatter=0.0)
+    plays, steps = (known.reducer.part(n).cells for n in ("friction", "clearance"))
+    friction = np.exp(-0.5 * (np.log(plays.threshold / 0.05) / 0.6) ** 2)
+    weights = known.weights | {"friction": 0.6 * friction / (friction @ plays.width)}
+    if extra:
+        size, low, high = extra
+        covered = np.clip(np.minimum(steps.up + steps.width, high) - np.maximum(steps.up, low), 0.0, None)
+        weights["clearance"] = weights["clearance"] + size * covered / covered.sum()
+    return replace(known, weights=weights)
+
+
+def planted(seed=0, *, known=None, offset_nm=0.0, lag_s=0.0, jitter=None, loops=LOOPS, noise=NOISE, **options) -> Unit:
     """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque."""
-    known = physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | options))
+    known = known or physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | options))
     rng, records = np.random.default_rng(seed + 20), []
     for amplitude, rate in loops:
         time, torque = ramp(amplitude, rate, HERTZ)

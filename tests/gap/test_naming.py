@@ -1,0 +1,96 @@
+"""What is planted in a unit of the class is named; of a clean one nothing is."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from support.planted import changed, planted, smooth_reducer
+
+from backdrive_bayes.engine.infer import prepare
+from backdrive_bayes.gap import probabilities as gap
+from backdrive_bayes.gap.hypotheses import weigh
+from backdrive_bayes.gap.properties import find_properties
+
+PERIOD_RAD = 0.004
+
+
+def smooth(extra=None, **options):
+    return planted(known=smooth_reducer(extra), **options)
+
+
+UNITS = {
+    "none": lambda: smooth(),
+    "torque_offset": lambda: smooth(offset_nm=8e-4),
+    "sensor_lag": lambda: smooth(lag_s=0.03),
+    # A wave that is even in the angle: an odd one is part of an odd loop.
+    "encoder_error": lambda: changed(smooth(), lambda r, i: 4e-4 * np.cos(2 * np.pi * r.angle_rad / PERIOD_RAD)),
+    "thermal_drift": lambda: changed(smooth(), lambda r, i: 1.5e-3 * (r.time_s / 20) ** 0.7),
+    "unknown": lambda: changed(smooth(), lambda r, i: 1.5e-3 * (r.time_s > 0.55 * r.time_s[-1]) * (i == 0)),
+    "second_backlash": lambda: smooth((0.15, 0.25, 0.35)),
+    "interface_slip": lambda: smooth((0.1, 0.75, 1.0)),
+}
+SYMMETRY_BREAKERS = [n for n in UNITS if n not in ("none", "second_backlash", "interface_slip")]
+
+
+@cache
+def found(name):
+    """What was weighed in a unit, the properties of its operator and the joint probabilities."""
+    weighed = weigh(prepare(UNITS[name]()))
+    properties = {p.name: p for p in find_properties(weighed.linear, np.random.default_rng(0))}
+    joint = gap.probabilities(weighed.log_factor, weighed.left, {n: p.probability for n, p in properties.items()})
+    return weighed, properties, joint
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_the_planted_name_is_the_likeliest(name):
+    answers = gap.labels(found(name)[2])
+    assert next(iter(answers)) == name and answers[name] > 0.45
+    assert name in gap.credible_set(answers)
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_probabilities_sum_to_one(name):
+    _, _, joint = found(name)
+    assert sum(joint.values()) == pytest.approx(1.0) and min(joint.values()) >= 0.0
+    answers = gap.labels(joint)
+    assert sum(answers.values()) == pytest.approx(1.0) and list(answers.values()) == sorted(answers.values(), reverse=True)
+    assert sum(answers[n] for n in gap.credible_set(answers)) >= gap.CALIBRATION.cover
+    assert gap.unlisted(joint) == pytest.approx(answers["unknown"])
+
+
+@pytest.mark.parametrize("name", SYMMETRY_BREAKERS)
+def test_what_breaks_a_symmetry_has_evidence_that_a_clean_unit_has_not(name):
+    clean, there = found("none")[0], found(name)[0]
+    assert there.log_factor[(name,)] > 15 and clean.log_factor[(name,)] < 3
+    assert max(clean.log_factor.values()) < 4
+    assert there.left[()] > clean.left[()] + 1
+
+
+def test_the_period_of_the_wave_is_found():
+    weighed = found("encoder_error")[0]
+    period = weighed.linear.reduced.angle_scale_rad / weighed.frequency[("encoder_error",)]
+    assert period == pytest.approx(PERIOD_RAD, rel=0.03)
+    other = found("none")[0]
+    assert other.linear.reduced.angle_scale_rad / other.frequency[("encoder_error",)] != pytest.approx(PERIOD_RAD, rel=0.03)
+
+
+@pytest.mark.parametrize(("name", "size", "torque"), [("second_backlash", 0.15, 0.3), ("interface_slip", 0.1, None)])
+def test_properties_are_found_on_units_that_have_them_and_not_on_others(name, size, torque):
+    here, elsewhere = found(name)[1][name], found("none")[1][name]
+    assert here.probability > 0.9 and elsewhere.probability < 0.35
+    assert np.median(here.size_rad) == pytest.approx(0.02 * size, rel=0.35)
+    assert torque is None or here.torque_nm == pytest.approx(0.1 * torque, rel=0.1)
+    other = "interface_slip" if name == "second_backlash" else "second_backlash"
+    assert found(name)[1][other].probability < 0.35
+    assert ("unknown" in found(name)[2]) is False and max(found(name)[0].log_factor.values()) < 4
+
+
+def test_effects_that_are_not_allowed_are_not_weighed():
+    weighed = weigh(prepare(UNITS["torque_offset"]()), ("sensor_lag", "thermal_drift"))
+    named = {n for h in weighed.log_factor for n in h}
+    assert named == {"sensor_lag", "thermal_drift", "unknown"}
+
+
+def test_weighing_again_gives_the_same_numbers():
+    linear = prepare(UNITS["none"]())
+    assert weigh(linear).log_factor == weigh(linear).log_factor == found("none")[0].log_factor

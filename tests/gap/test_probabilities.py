@@ -1,0 +1,69 @@
+"""From log Bayes factors to probabilities: what more evidence, more misfit and a second name do."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backdrive_bayes.gap.probabilities import CALIBRATION, credible_set, labels, log_prior, probabilities, unlisted
+
+FACTORS = st.floats(-30.0, 1e4)
+
+
+def given_factors(lag=0.0, drift=0.0, both=0.0, unknown=0.0):
+    log = {(): 0.0, ("lag",): lag, ("drift",): drift, ("drift", "lag"): both, ("unknown",): unknown}
+    return log | {("lag", "unknown"): max(lag, unknown), ("drift", "unknown"): max(drift, unknown)}
+
+
+def answer(log, left=None, properties=None):
+    return probabilities(log, {h: 1.0 for h in log if "unknown" not in h} | (left or {}), properties or {})
+
+
+@given(FACTORS, FACTORS, FACTORS, FACTORS, st.floats(0.03, 0.97))
+def test_probabilities_are_probabilities(lag, drift, both, unknown, p):
+    joint = answer(given_factors(lag, drift, both, unknown), properties={"slip": p})
+    values = np.array(list(joint.values()))
+    assert np.isfinite(values).all() and np.all(values >= 0) and values.sum() == pytest.approx(1.0)
+    assert sum(labels(joint).values()) == pytest.approx(1.0)
+    assert 0 <= unlisted(joint) <= 1
+
+
+def test_nothing_is_likeliest_where_nothing_speaks():
+    found = labels(answer(given_factors()))
+    assert next(iter(found)) == "none" and found["none"] > 0.6
+
+
+def test_more_evidence_makes_a_name_more_probable():
+    shares = [labels(answer(given_factors(lag=x, both=x)))["lag"] for x in (0.0, 5.0, 20.0, 200.0)]
+    assert shares == sorted(shares) and shares[-1] > 0.7
+
+
+def test_a_second_name_must_earn_its_place():
+    alone = labels(answer(given_factors(lag=50.0, both=51.0)))
+    assert alone["lag"] > 10 * alone["drift+lag"]
+    together = labels(answer(given_factors(lag=50.0, drift=40.0, both=250.0)))
+    assert next(iter(together)) == "drift+lag"
+    prior = {h: log_prior(h, CALIBRATION) for h in ((), ("lag",), ("drift", "lag"), ("encoder_error",))}
+    assert prior[("drift", "lag")] < prior[("lag",)] < prior[()] == 0.0 and prior[("encoder_error",)] < prior[("lag",)]
+
+
+def test_what_is_left_speaks_for_something_unlisted():
+    log = given_factors(unknown=20.0)
+    assert unlisted(answer(log, {(): 50.0})) > unlisted(answer(log, {(): 1.0}))
+
+
+def test_a_property_stands_beside_the_rest():
+    found = labels(answer(given_factors(), properties={"slip": 0.97}))
+    assert next(iter(found)) == "slip"
+    rare = answer(given_factors(lag=80.0, both=80.0), properties={"slip": 0.5})
+    assert sum(p for h, p in rare.items() if "slip" in h) < 0.2, "beside another effect it is rarer"
+
+
+def test_a_credible_set_holds_the_fewest_answers():
+    assert credible_set({"a": 0.5, "b": 0.1, "c": 0.4}, 0.9) == ["a", "c"]
+    assert credible_set({"a": 0.95, "b": 0.05}) == ["a"] and CALIBRATION.cover > 0.9
+
+
+def test_a_factor_that_is_no_number_is_an_error():
+    with pytest.raises(FloatingPointError):
+        answer(given_factors(lag=float("nan")))
