@@ -13,10 +13,11 @@ from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.engine.reduced import Reduced, reduce_unit
 from backdrive_bayes.engine.sample import sample
-from backdrive_bayes.mechanics.registry import BENCH, all_effects
 from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.mechanics.registry import BENCH, all_effects
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
+
 
 def library_terms():
     """Every term of every listed effect, and what every bench has."""

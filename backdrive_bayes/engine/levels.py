@@ -9,7 +9,6 @@ from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.mechanics.registry import all_effects
 
-
 PRESENT_SD = 1.0
 """Standard deviation of the log scale of an effect that a hypothesis holds."""
 

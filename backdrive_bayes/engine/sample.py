@@ -9,7 +9,7 @@ import numpy as np
 from emcee.moves import DEMove, Move
 from scipy.linalg import cholesky, solve_triangular
 
-from backdrive_bayes.engine.diagnostics import MIN_ESS, Convergence, diagnose_draws
+from backdrive_bayes.engine.diagnostics import Convergence, diagnose_draws
 from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, Whitened
 
 ENSEMBLES = 4
@@ -22,7 +22,7 @@ WIDTHS = ((1.0, 0.7), (2.5, 0.3))
 """Widths of the two parts of the proposal, and their shares: a scale that the data do not need has a long lower tail."""
 FIRST_STEPS = 12
 MOST_STEPS = 384
-KEPT = 250
+KEPT = 400
 """Draws kept of every ensemble."""
 
 

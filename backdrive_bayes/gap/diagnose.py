@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import expit
 from threadpoolctl import threadpool_limits
 
-from backdrive_bayes.engine.design import path_group
-from backdrive_bayes.engine.infer import infer, prepare
+from backdrive_bayes.engine.infer import prepare
+from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linearise import Linear
-from backdrive_bayes.engine.periodic import wave_group
+from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import next_test, probabilities, where
+from backdrive_bayes.gap.averaged import posterior_of, with_columns
 from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed, weigh
-from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.gap.parameters import effect_parameters, interval
 from backdrive_bayes.gap.properties import Property, find_properties
 from backdrive_bayes.gap.shrink import Fitted, fit_hypothesis, shrink
-from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
 from backdrive_bayes.indicators.draws import IndicatorDraws
 from backdrive_bayes.mechanics.reducer import BASELINE
-from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
+from backdrive_bayes.mechanics.registry import all_effects
 from backdrive_bayes.records.check import check_unit
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.results import DIAGNOSIS
@@ -133,8 +132,8 @@ class _Found:
         inconclusive = _why_inconclusive(self.unit)
         listed = tuple(e for e in effects if e in all_effects())
         progress("sampling the chosen model")
-        posterior = infer(self.linear, listed, self.seed, progress)
-        none = posterior if not listed else infer(self.linear, (), self.seed, progress)
+        posterior = posterior_of(self.weighed, effects, self.seed, progress)
+        none = posterior_of(self.weighed, (), self.seed, progress) if effects else posterior
         json = {
             "schema": DIAGNOSIS,
             "unit": self.unit.name,
@@ -173,15 +172,8 @@ class _Found:
 
     def _fitted(self, effects) -> Fitted:
         """A hypothesis in the linear model; what has no columns of its own stands for itself by those of the class."""
-        design, linear = self.linear.design, self.linear
-        priors = levels(linear, tuple(effects))
-        if ENCODER in effects:
-            frequency = next(f for h, f in self.weighed.frequency.items() if ENCODER in h)
-            design = design.joined(replace(wave_group(linear, frequency), name="wave"))
-            priors["wave"] = (float(np.log(6e-3)), 1.0)
-        if STICK_SLIP in effects:
-            design = design.joined(path_group(linear.reduced, UNKNOWN))
-            priors[UNKNOWN.name] = (float(np.log(UNKNOWN.present(linear.reduced.context))), 2.0)
+        linear = with_columns(self.weighed, effects)
+        design, priors = linear.design, levels(linear, tuple(effects))
         for module in self.withheld:
             if module not in effects:
                 for part in linear.reducer.parts:

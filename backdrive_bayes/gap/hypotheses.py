@@ -14,8 +14,8 @@ from backdrive_bayes.engine.design import Design, Group, path_group
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.linearise import Linear, linearise
 from backdrive_bayes.engine.marginal import whiten
-from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.engine.periodic import FREQUENCIES, wave_group
+from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 
 ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"

@@ -1,0 +1,85 @@
+"""The posterior that `fit` gives: averaged over the hypotheses that remain probable."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from backdrive_bayes.engine.design import path_group
+from backdrive_bayes.engine.infer import infer, prepare
+from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.marginal import whiten
+from backdrive_bayes.engine.periodic import wave_group
+from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.gap import probabilities
+from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, UNEXPLAINED, WAVE, Weighed, weigh
+from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
+from backdrive_bayes.records.record import Unit
+
+LEAST = 0.2
+"""Hypotheses less probable than this share of the likeliest are left out of the average."""
+MOST = 2
+"""Hypotheses that are averaged over at most."""
+
+
+def fit_posterior(unit: Unit, modules=BASELINE, seed: int = 0, note=lambda text: None) -> Posterior:
+    """Posterior of a unit, averaged over what may break the symmetries of its class, the model discrepancy included."""
+    with threadpool_limits(1, user_api="blas"):
+        linear = prepare(unit, modules, note)
+        note("weighing effects")
+        weighed = weigh(linear)
+        joint = probabilities.probabilities(weighed.log_factor, weighed.left, {})
+        likeliest = sorted(joint.items(), key=lambda item: -item[1])[:MOST]
+        kept = [(h, p) for h, p in likeliest if p >= LEAST * likeliest[0][1]]
+        drawn = [(posterior_of(weighed, h, seed, note), p) for h, p in kept]
+    return mixed(drawn)
+
+
+def posterior_of(weighed: Weighed, effects: tuple[str, ...], seed: int, note=lambda text: None) -> Posterior:
+    """Posterior under one set of effects, in the linear model that weighed it."""
+    listed = tuple(e for e in effects if e in all_effects())
+    return replace(infer(with_columns(weighed, effects), listed, seed, note), hypothesis=tuple(effects))
+
+
+def with_columns(weighed: Weighed, effects: tuple[str, ...]) -> Linear:
+    """The linear model with the columns of effects that it does not hold yet: an encoder's wave, what is unexplained."""
+    linear, groups, scales = weighed.linear, [], {}
+    if ENCODER in effects:
+        frequency = weighed.frequency.get(tuple(effects)) or next(f for h, f in weighed.frequency.items() if ENCODER in h)
+        groups.append(replace(wave_group(linear, frequency), name="wave"))
+        scales["wave"] = float(np.log(WAVE))
+    if UNEXPLAINED in effects or STICK_SLIP in effects:
+        groups.append(path_group(linear.reduced, UNKNOWN))
+        scales[UNKNOWN.name] = float(np.log(UNKNOWN.present(linear.reduced.context)))
+    if not groups:
+        return linear
+    design = linear.design.joined(*groups)
+    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    return replace(linear, design=design, data=data, log_scale=linear.log_scale | scales)
+
+
+def mixed(drawn: list[tuple[Posterior, float]]) -> Posterior:
+    """Draws of several posteriors of one linear model in proportion to their probabilities; the first is the likeliest."""
+    first, total = drawn[0][0], sum(p for _, p in drawn)
+    if len(drawn) == 1:
+        return first
+    draws = first.shape[1]
+    counts = [max(1, int(round(draws * p / total))) for _, p in drawn[1:]]
+    counts = [draws - sum(counts), *counts]
+    picks = [np.linspace(0, q.shape[1] - 1, n).astype(int) for (q, _), n in zip(drawn, counts, strict=True)]
+    common = [n for n in first.weights if all(n in q.weights for q, _ in drawn)]
+
+    def join(part):
+        return np.concatenate([part(q)[:, k] for (q, _), k in zip(drawn, picks, strict=True)], axis=1)
+
+    worst = min((q.convergence for q, _ in drawn), key=lambda c: (c.converged, -np.nanmax(c.rhat)))
+    return replace(
+        first,
+        weights={n: join(lambda q, n=n: q.weights[n]) for n in common},
+        log_scale={n: join(lambda q, n=n: q.log_scale[n]) for n in common},
+        log_density=join(lambda q: q.log_density),
+        convergence=worst,
+    )
