@@ -142,7 +142,9 @@ def _write_posterior(path, records, parameters):
     angle = np.where(sign > 0, branch(torque, 1), branch(torque, -1)) + 0.5
     n = torque.size
     noise = 2e-4 * rng.standard_normal((CHAINS, 20, records * n))
-    shared = {
+    scales = {f"log_scale_{k}": (("chain", "draw"), rng.standard_normal((CHAINS, DRAWS))) for k in ("elastic", "friction")}
+    scales["log_scale_sensor_lag"] = (("chain", "draw"), np.full((CHAINS, DRAWS), -7.6))
+    shared = scales | {
         k: (("chain", "draw"), v * np.exp(0.05 * rng.standard_normal((CHAINS, DRAWS))))
         for k, (_, v) in parameters.items()
     }

@@ -19,8 +19,8 @@ def draw(saved: Saved):
     with styled():
         figure = new_figure(2.3)
         left, *axes = figure.subplots(1, 3, width_ratios=[1.15, 1, 1])
-        torque_energy.draw_curve(left, saved, main)
-        left.set(title=labels[main], xlabel="|torque| [N·m]", ylabel="energy per torque\n[mJ/(N·m)]")
+        low = "low " if torque_energy.draw_curve(left, saved, main) else ""
+        left.set(title=labels[main], xlabel=f"{low}|torque| [N·m]", ylabel="energy per torque\n[mJ/(N·m)]")
         few_ticks(left, 3)
         shown = list(range(min(len(labels), len(SERIES))))
         amplitude.draw_panels(axes, saved, shown, labels)

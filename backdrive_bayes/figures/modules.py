@@ -23,8 +23,6 @@ CAPTION = (
 COLUMNS = 4
 VISIBLE = 0.02
 """Effects that span less than this share of the loop's range have no panel."""
-LETTERS = 9
-"""Longer names leave no room for more beside them."""
 LEGIBLE = 0.1
 """Panels that span less than this share of the loop's range get a scale of their own."""
 ALIKE = 0.03
@@ -95,8 +93,7 @@ def _scales(axes, curves):
     whole = max(np.ptp(curves[0][1]), np.ptp(curves[0][2]))
     for panel, (name, *branches) in zip(axes, curves, strict=False):
         if max(np.ptp(b) for b in branches) < LEGIBLE * whole:
-            gap = " " if len(name) <= LETTERS else "\n"
-            panel.set_title(f"{name}{gap}(own scale)")
+            panel.set_title(f"{name}\n(own scale)")
         else:
             panel.set_ylim(axes[0].get_ylim())
 

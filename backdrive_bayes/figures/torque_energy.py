@@ -26,9 +26,8 @@ def draw(saved: Saved, records: list[int]):
         for panel, record in zip(axes, records, strict=True):
             tau1, tau2 = _tau(saved, record)
             enlarged = draw_curve(panel, saved, record)
-            more = " (low torques)" if enlarged else ""
-            panel.set_title(f"{labels[record]}{more}\nτ₁ {tau1:.2g}, τ₂ {tau2:.2g} N·m")
-            panel.set_xlabel("|torque| [N·m]")
+            panel.set_title(f"{labels[record]}\nτ₁ {tau1:.2g}, τ₂ {tau2:.2g} N·m")
+            panel.set_xlabel("low |torque| [N·m]" if enlarged else "|torque| [N·m]")
         axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
         handles, names = axes[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=len(names))

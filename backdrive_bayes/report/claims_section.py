@@ -23,14 +23,14 @@ def claims(result) -> list:
     source = f" Source: {free(found['source'])}." if found["source"] else ""
     letters = ", ".join(f"{free(letter, 12)} is {free(name, 60)}" for letter, name in found["units"].items())
     return [
-        Heading("Claims"),
+        Heading("Claims", 1),
         Paragraph(f"Each claim is a question to the posteriors, answered with a probability. {letters}.{source} {_count(found)}"),
         *_origins(result),
         Table(_COLUMNS, [_row(c) for c in found["claims"]], _WIDTHS),
         Note(
-            f"✓ holds, from a probability of {found['holds_from']:g}; ✗ does not hold, up to {found['fails_below']:g}; – "
-            "open between, or not answered. Numbers: median [90 % interval] at the first rate asked, of a series the medians at its "
-            "ends and its largest; all of them, with the predicates, are in comparison.json."
+            f"✓ holds, from a probability of {found['holds_from']:g}; ✗ does not hold, up to {found['fails_below']:g}; "
+            "– open between, or not answered. Numbers: median [90 % interval] at the first rate asked, of a series the medians "
+            "at its ends and its largest; all of them, with the predicates, are in comparison.json."
         ),
     ]
 

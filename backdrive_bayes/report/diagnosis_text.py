@@ -7,6 +7,7 @@ from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, m
 from backdrive_bayes.figures.style import in_words
 from backdrive_bayes.report.blocks import Facts, Paragraph
 from backdrive_bayes.report.numbers import significant
+from backdrive_bayes.report.sentences import proposal
 from backdrive_bayes.report.text import Free, free
 
 LEAST_BITS = 0.005
@@ -97,5 +98,5 @@ def next_test(saved: Diagnosed) -> list:
     if test.get("expected_entropy_drop_bits") is not None:
         drop = significant(test["expected_entropy_drop_bits"], 2)
         rows.append(("Expected gain", f"{drop} bit less uncertainty about the cause"))
-    todo = in_words(str(test.get("do") or "").strip()).replace(" or: ", "; or, equally informative: ")
+    todo = in_words(proposal(str(test.get("do") or "").strip()))
     return [Paragraph(free(todo[:1].upper() + todo[1:], 600)), Facts(rows)]

@@ -63,7 +63,7 @@ def _spelt(character):
 def _breakable(found):
     word, step = found[0], UNBREAKABLE // 2
     # A digest fits its line, and a break inside it would be copied along with it.
-    if _DIGEST.fullmatch(word):
+    if _DIGEST.fullmatch(word.rstrip(".,;")):
         return word
     pieces = re.split(r"(?<=[(),;=/])|(?<=\.)(?=\D)", word)
     return BREAK.join(p[i : i + step] for p in pieces for i in range(0, len(p), step))

@@ -207,4 +207,5 @@ def test_a_bad_file_is_one_clear_line(tmp_path, content):
 def test_numbers_in_words():
     assert [chance(p) for p in (0.0, 0.003, 0.5, 0.996, 1.0)] == ["0 %", "<1 %", "50 %", ">99 %", "100 %"]
     assert share_text(interval(-0.2, 0.1)) == "−20 % [−30, −10]"
+    assert share_text({"median": -1.0, "lo": -1.0, "hi": 0.1}) == "≤ −100 % [≤ −100, 10]"
     assert share_text(interval(0.11, 0.0)) == "11 %" and share_text(None) == "not defined"

@@ -18,7 +18,7 @@ from backdrive_bayes.figures import catalogue, loop
 from backdrive_bayes.figures.saved import Saved, record_blocks
 from backdrive_bayes.figures.style import drawn_words, in_words, numbers, parts, record_labels, styled, words
 
-NAMES = ["loop", "modules", "torque-energy", "amplitude", "corner", "trace", "predictive"]
+NAMES = ["loop", "modules", "torque-energy", "amplitude", "energy", "corner", "trace", "predictive"]
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ def crowded(tmp_path_factory):
     """All that a diagnosed model may hold: every parameter and module there is, in six records of one rate."""
     path = tmp_path_factory.mktemp("crowded")
     shared = {p.name: (p.unit, SIZES[p.unit]) for p in PARAMETERS}
-    shared |= {f"log_scale_of_{i}_{words}": ("1", 0.4) for i, words in enumerate(["thermal_drift", "friction", "elastic"] * 8)}
+    shared |= {f"parameter_{i}_of_{words}": ("1", 0.4) for i, words in enumerate(["thermal_drift", "friction", "elastic"] * 8)}
     result = write_result(path, records=6, shared=shared)
     for i, record in enumerate(result["records"]):
         record["loading_rate_Nm_per_s"] = 0.05
@@ -128,11 +128,23 @@ def test_every_parameter_and_module_is_shown_readably(crowded):
     for figure in drawn.values():
         assert_readable(figure)
     corners = [t.get_text() for n, f in drawn.items() if n.startswith("corner") for t, _ in texts(f)]
-    traced = [t.get_text() for t, _ in texts(drawn["trace"])]
     for name in names:
         labels = [text for text in corners if text.replace("\n", " ").startswith(f"{words(name)} [")]
-        assert len(labels) == 2, f"{name} is named at its row and at its column, with its unit"
-        assert words(name) in [text.replace("\n", " ") for text in traced]
+        assert len(labels) == 1, f"{name} is named above its column, with its unit"
+
+
+def test_traces_are_of_the_scales_that_were_sampled(figures):
+    traced = " ".join(t.get_text() for t, _ in texts(figures["trace"]))
+    assert "log scale of elastic" in traced and "log posterior density" in traced and "ensemble 3" in traced
+    assert "sensor lag" not in traced, "held at trace level"
+
+
+def test_the_main_record_is_the_largest_loop_near_the_default_rate(folder, tmp_path):
+    assert Saved.read(folder).main_record == 1
+    result = write_result(tmp_path, records=3)
+    result["records"][1]["amplitude_Nm"] = 0.05
+    (tmp_path / "indicators.json").write_text(json.dumps(result))
+    assert Saved.read(tmp_path).main_record == 2
 
 
 def test_a_corner_plot_of_narrow_posteriors_is_readable(tmp_path):
@@ -188,7 +200,7 @@ def test_many_records_make_several_figures_with_distinct_labels(tmp_path):
 def test_the_json_alone_gives_the_figures_that_need_no_draws(tmp_path):
     write_result(tmp_path, records=1)
     (tmp_path / "posterior.nc").unlink()
-    assert list(catalogue.all_figures(tmp_path)) == NAMES[:4]
+    assert list(catalogue.all_figures(tmp_path)) == NAMES[:5]
 
 
 def test_files_are_the_same_bytes_again(folder, tmp_path):
@@ -208,7 +220,7 @@ def test_files_are_the_same_bytes_again(folder, tmp_path):
 def test_save_figures_writes_vector_and_pixels(tmp_path):
     write_result(tmp_path / "r", records=1)
     written = catalogue.save_figures(tmp_path / "r", tmp_path / "figures")
-    assert len(written) == 14 and all(p.stat().st_size > 1000 for p in written)
+    assert len(written) == 16 and all(p.stat().st_size > 1000 for p in written)
 
 
 @pytest.mark.parametrize("content", [None, "{", "[]", '{"schema": "other/1"}'])

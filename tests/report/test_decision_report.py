@@ -77,7 +77,7 @@ def test_what_is_uncovered_is_named(tmp_path):
     found = diagnosis(["sensor_lag"], sensor_lag=0.8, none=0.2)
     write_json(tmp_path / "verdict.json", assess([evidence(diagnosis=found)], Limits((Limit("peak_angle_rad", hi=1.0),))))
     text, _ = pages(tmp_path)
-    assert "sensor lag (80 %)" in text[0] and "in no model at hand: sensor lag" in " ".join(text)
+    assert "sensor lag (80 %)" in text[0] and "in no model at hand with probability 0.80: sensor lag 0.80" in text[0]
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +121,7 @@ def test_claims_stand_with_probability_and_verdict(comparison):
     for claim in result["claims"]["claims"]:
         start = re.escape(claim["claim"][:24])
         assert re.search(start, whole), claim["claim"]
+    assert "✓" in whole and "✗" in whole and ".parameter(" not in whole and "_J" not in whole
     assert "does not hold" in whole and "not answered" in whole and "unit U was not given" in whole
 
 
@@ -134,7 +135,7 @@ def test_claims_are_counted_in_a_sentence():
 def test_a_value_stays_on_one_line_with_its_interval(comparison):
     lines = [line for page in comparison[2].pages for line in page.extract_text().splitlines()]
     broken = [line for line in lines if re.search(r"\[[−\d.]*,?( [−\d.]+)?$|^[−\d., ]*\]", line.strip())]
-    assert sum("]" in line for line in lines) > 40 and not broken
+    assert sum("]" in line for line in lines) > 30 and not broken
 
 
 def test_a_series_that_is_nothing_at_its_ends_is_not_a_wall_of_digits():
@@ -148,7 +149,7 @@ def test_a_chapter_does_not_begin_at_the_foot_of_a_page(monkeypatch, tmp_path):
     monkeypatch.setattr(sections, "chapters", lambda folder: made)
     reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path])))
     heights = chapter_heights(reader)
-    assert len(heights) == 2 * len(made) + 1
+    assert len(heights) == 2 * len(made) + 2
     assert min(heights) > (20 + 60) / 25.4 * 72
     assert len(reader.pages) < 2 * len(made)
 
@@ -180,7 +181,10 @@ def test_all_results_of_a_folder_make_chapters(tmp_path):
     (tmp_path / "posterior.nc").unlink()
     write_json(tmp_path / "verdict.json", assess([evidence("u")], Limits((Limit("peak_angle_rad", hi=1.0),))))
     text, _ = pages(tmp_path)
-    assert "ACCEPTED" in text[0] and "CONVERGED" in text[1]
+    overview = text[0]
+    assert "ACCEPTED" in overview and "converged; 1 record" in overview and "structure not examined" in overview
+    assert "Contents" in overview and "Key indicators" in overview and re.search(r"Results of \d+ [A-Z][a-z]+ \d{4}", overview)
+    assert "ACCEPTED" in text[1] and "no diagnosis was given" in text[1] and "CONVERGED" in text[2]
 
 
 def test_an_incomplete_verdict_is_one_clear_line(tmp_path):

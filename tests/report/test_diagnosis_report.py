@@ -80,7 +80,6 @@ def test_tables_name_the_level_of_their_intervals(made):
     text = " ".join(made[1])
     for words in ("Median [90 % interval] Unit", "Closed fraction with its 90 % interval", "[90 % interval] without and with"):
         assert words in text
-    assert "value and 90 % interval of each record" in text
 
 
 def test_a_parameter_that_was_as_good_as_fixed_gives_no_wall_of_digits(tmp_path):
@@ -105,13 +104,13 @@ def test_a_gap_that_is_not_there(tmp_path):
     assert not any("How far it shrinks" in p or "Next test" in p or "What it changes" in p for p in pages)
 
 
-def test_a_name_that_foretells_nothing_is_doubted(tmp_path):
+def test_a_name_that_closes_nothing_is_doubted(tmp_path):
     result = write_diagnosis(tmp_path, 1)
     for hi, title in ((-0.1, "THE NAME IN DOUBT"), (0.2, "CAUSE NAMED")):
         shrink = result["shrink"] | {"closed_fraction": {"median": -0.4, "lo": -0.8, "hi": hi}}
         write_diagnosis(tmp_path, 1, shrink=shrink, answer={"effects": ["interface_slip"], "credible_set_90": ["interface_slip"]})
         pages, _ = pages_of(tmp_path)
-        assert title in pages[0] and ("foretells nothing" in pages[0]) == (hi < 0)
+        assert title in pages[0] and ("predicts nothing of what it is named for" in pages[0]) == (hi < 0)
 
 
 @pytest.mark.parametrize(("unlisted", "told"), [(0.98, True), (0.06, False)])
@@ -136,7 +135,7 @@ def test_an_unknown_cause_credits_nothing_to_a_name(tmp_path):
     write_diagnosis(tmp_path, answer={"effects": ["unknown"], "credible_set_90": ["unknown"]})
     pages, _ = pages_of(tmp_path)
     assert "GAP OF UNKNOWN CAUSE" in pages[0] and "The best listed candidate closes 91 %" in pages[0]
-    assert "foretells nothing" not in pages[0]
+    assert "predicts nothing" not in pages[0]
     assert "Parameters of" not in " ".join(pages)
 
 
@@ -183,7 +182,7 @@ def test_a_fit_and_a_diagnosis_in_one_folder_make_two_chapters(tmp_path):
     write_result(tmp_path, records=1)
     (tmp_path / "posterior.nc").unlink()
     pages, _ = pages_of(tmp_path)
-    assert "CONVERGED" in pages[0] and "CAUSE" in pages[1]
+    assert "converged; 1 record" in pages[0] and "CONVERGED" in pages[1] and "CAUSE" in pages[2]
 
 
 def test_a_broken_result_is_one_clear_line(tmp_path):

@@ -96,7 +96,7 @@ def test_details_name_seed_versions_priors_and_reconstructed_equations(made):
 def test_intervals_come_with_their_level(made):
     text = text_of(made[2])
     assert "median and 90 % interval" in text and "median and interval" not in text
-    for beneath in ("S", "τ₁: half the rise", "Angle turned and energy absorbed", "Over all t"):
+    for beneath in ("S", "τ₁: half the rise"):
         assert f"Median [90 % interval]. {beneath}" in text
 
 
@@ -107,19 +107,20 @@ def test_parameters_stand_beside_the_implied_prior_with_their_meaning(made):
     assert "drag torque: what drag_torque_Nm means" in text and "Implied prior, 90 %" in text
 
 
-def test_loads_and_windows_are_shown_where_they_are_saved(tmp_path):
+def test_loads_are_shown_where_they_are_saved(tmp_path):
     result = write_result(tmp_path, records=1)
     (tmp_path / "posterior.nc").unlink()
-    assert not re.search("Windows|Loads that were asked for", folder_text(tmp_path))
+    assert "Loads that were asked for" not in folder_text(tmp_path)
     angle, energy = ({"median": m, "lo": 0.9 * m, "hi": 1.1 * m} for m in (0.0728, 1.562e-3))
     load = {"load_Nm": 0.05, "loading_rate_Nm_per_s": 0.02, "theta_L_rad": angle, "W_L_J": energy, "predicted": []}
     result["loads"] = [load, load | {"load_Nm": 0.2, "predicted": ["load", "loading_rate"]}]
-    result["records"][0]["windowed"] = result["records"][0]["by_amplitude"] | {"max_u": {"median": 2.5, "lo": 2.4, "hi": 2.6}}
+    over = {"median": 0.98, "lo": 0.95, "hi": 1.04}
+    result["records"][0]["indicators"]["dissipation_ratio"] = over
     (tmp_path / "indicators.json").write_text(json.dumps(result))
     text = folder_text(tmp_path)
     shown = f"{interval_text(angle, ARCMIN)} {interval_text(energy, 1e3)}"
     assert f"0.0500 0.0200 {shown} no" in text and f"0.200 0.0200 {shown} load and rate" in text
-    assert "Windows |τ| ≤ t" in text and "u max [–] 2.50 [2.40, 2.60]" in text and "may exceed 1" in text
+    assert interval_text(over | {"hi": 1.0}) in text and "1.04" not in text, "the dissipation ratio ends at 1"
 
 
 def folder_text(folder):
@@ -142,6 +143,16 @@ def test_not_converged_is_inconclusive_with_advice(tmp_path):
     (tmp_path / "posterior.nc").unlink()
     page = text_of(pypdf.PdfReader(report.write_report([tmp_path], tmp_path / "out" / "r.pdf")), 0)
     assert "INCONCLUSIVE" in page and "give it more time" in page and "Do not use" in page
+    assert "not converged – provisional" in page and "Signature" not in page
+
+
+def test_what_the_check_found_and_was_overruled_stands_on_the_first_page(tmp_path):
+    finding = {"level": "warning", "code": "x", "text": "the rated torque is 1000 times what was tested", "record": "a.csv"}
+    note = finding | {"level": "note", "text": "closes well"}
+    write_result(tmp_path, records=1, findings=[finding, note], forced=True)
+    (tmp_path / "posterior.nc").unlink()
+    page = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path]))), 0)
+    assert "FORCED: unfit data" in page and "warning, a.csv: the rated torque is 1000 times" in page and "closes well" not in page
 
 
 def test_the_summary_stays_on_one_page_whatever_the_unit_says(tmp_path):
@@ -165,7 +176,7 @@ def test_least_squares_stand_beside_the_posterior(tmp_path):
     (tmp_path / "indicators.json").write_text(json.dumps(result))
     (tmp_path / "posterior.nc").unlink()
     text = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path]))))
-    assert "0.3630 [0.3612, 0.3648] 0.3020" in text and "R² = 0.9991" in text and "not defined" in text
+    assert "0.3020 0.3630" in text and "0.9991" in text and "not defined" in text
 
 
 def test_several_folders_make_one_report_with_a_summary_each(tmp_path):
@@ -173,7 +184,8 @@ def test_several_folders_make_one_report_with_a_summary_each(tmp_path):
         write_result(tmp_path / name, records=1, unit=f"unit {name}")
         (tmp_path / name / "posterior.nc").unlink()
     reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path / "a", tmp_path / "b"])))
-    assert "unit a" in text_of(reader, 0) and "unit b" in text_of(reader, 1)
+    assert "unit a" in text_of(reader, 0) and "unit b" in text_of(reader, 0)
+    assert "unit a" in text_of(reader, 1) and "unit b" in text_of(reader, 2)
     assert reader.metadata.title == "Backdrivability report: unit a, unit b"
 
 
@@ -220,6 +232,8 @@ def test_the_verb_writes_into_the_first_folder_or_into_out(tmp_path, capsys):
     assert (tmp_path / "a" / "report.pdf").exists() and (tmp_path / "a" / "indicators.json").exists()
     assert run(Namespace(results=[tmp_path / "a"], out=tmp_path / "b")) == 0
     assert (tmp_path / "b" / "report.pdf").read_bytes() == (tmp_path / "a" / "report.pdf").read_bytes()
+    assert run(Namespace(results=[tmp_path / "a"], out=tmp_path / "my.pdf")) == 0
+    assert (tmp_path / "my.pdf").read_bytes() == (tmp_path / "a" / "report.pdf").read_bytes()
     assert "report.pdf" in capsys.readouterr().out
 
 
