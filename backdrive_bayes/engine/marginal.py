@@ -41,7 +41,7 @@ class Whitened:
 
     x: np.ndarray
     y: np.ndarray
-    samples: int
+    samples: float
     noise_dof: float
     log_volume: float = 0.0
 
@@ -49,6 +49,11 @@ class Whitened:
         object.__setattr__(self, "gram", self.x.T @ self.x)
         object.__setattr__(self, "moment", self.x.T @ self.y)
         object.__setattr__(self, "total", float(self.y @ self.y))
+
+    def coarsened(self, power: float) -> Whitened:
+        """The same with the likelihood raised to a power, as if there were fewer independent samples of the same noise."""
+        root = np.sqrt(power)
+        return Whitened(self.x * root, self.y * root, self.samples * power, self.noise_dof, self.log_volume)
 
     def solve(self, scale) -> Solution:
         """Posterior of the weights for standard deviations ``scale`` (weights,)."""
