@@ -171,9 +171,11 @@ def draw_weights(data: Whitened, basis: Basis, log_scale, count: int, rng) -> np
     seen = solve_triangular(lower, scale * data.moment, lower=True, check_finite=False)
     chi2 = max(data.total - float(seen @ seen), 0.0)
     spread = np.sqrt((data.noise_dof + chi2) / rng.chisquare(data.noise_dof + data.samples, count))
-    noisy = seen[:, None] + spread * rng.standard_normal((scale.size, count))
+    # Drawn in the columns' own weights: signs and turns of principal directions must not change what a seed gives.
+    random = rng.standard_normal((basis.turn.shape[0], count))
+    noisy = seen[:, None] + spread * (basis.turn.T @ random)
     standard = solve_triangular(lower, noisy, lower=True, trans=1, check_finite=False)
-    unseen = by_group[basis.rest_group, None] * rng.standard_normal((basis.rest_group.size, count)) * spread
+    unseen = by_group[basis.rest_group, None] * (basis.rest.T @ random) * spread
     return (basis.turn @ (scale[:, None] * standard) + basis.rest @ unseen).T
 
 
