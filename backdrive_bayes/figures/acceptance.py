@@ -33,7 +33,7 @@ def draw(verdict: dict, rows: list[int]):
     columns = min(2, len(rows))
     lines = -(-len(rows) // columns)
     with styled():
-        figure = new_figure(0.6 + 1.02 * lines)
+        figure = new_figure(0.6 + 0.92 * lines)
         axes = figure.subplots(lines, columns, squeeze=False).ravel()
         for panel, row in zip(axes, rows, strict=False):
             _panel(panel, verdict["limits"][row])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 from backdrive_bayes.figures import (
@@ -59,20 +60,20 @@ def all_figures(folder: Path) -> dict[str, Figure]:
     return out | (diagnosis.figures_of(Diagnosed.read(folder)) if diagnosed else {})
 
 
-def figures_of(saved: Saved) -> dict[str, Figure]:
-    """The same from results already read; those that need draws are left out where only the JSON is there."""
+def figures_of(saved: Saved, wanted=lambda name: True) -> dict[str, Figure]:
+    """The same from results already read, as far as ``wanted`` by name; those that need draws only where they were saved."""
     everything = list(range(len(saved.records)))
-    out = _split("loop", loop.draw, saved, everything, PER_FIGURE)
-    out |= _split("modules", modules.draw, saved, modules.distinct(saved), 1)
-    out |= _split("torque-energy", torque_energy.draw, saved, everything, PER_FIGURE)
-    out |= _split("amplitude", amplitude.draw, saved, everything, len(SERIES))
-    out["energy"] = energy.draw(saved)
+    makers = _makers("loop", loop.draw, saved, everything, PER_FIGURE)
+    makers |= _makers("modules", modules.draw, saved, modules.distinct(saved), 1)
+    makers |= _makers("torque-energy", torque_energy.draw, saved, everything, PER_FIGURE)
+    makers |= _makers("amplitude", amplitude.draw, saved, everything, len(SERIES))
+    makers["energy"] = partial(energy.draw, saved)
     if saved.posterior_file:
         shared = list(corner_plot.shared_parameters(saved))
-        out |= _split("corner", corner_plot.draw, saved, shared, corner_plot.in_one_figure(len(shared)))
-        out["trace"] = trace.draw(saved)
-        out |= _split("predictive", predictive.draw, saved, everything, PER_FIGURE)
-    return out
+        makers |= _makers("corner", corner_plot.draw, saved, shared, corner_plot.in_one_figure(len(shared)))
+        makers["trace"] = partial(trace.draw, saved)
+        makers |= _makers("predictive", predictive.draw, saved, everything, PER_FIGURE)
+    return {name: make() for name, make in makers.items() if wanted(name)}
 
 
 def verdict_figures(verdict: dict) -> dict[str, Figure]:
@@ -91,8 +92,14 @@ def comparison_figures(result: dict) -> dict[str, Figure]:
     return out | {"comparison-mechanism": comparison.draw_mechanism(result)}
 
 
+def _makers(name, draw, saved, records, at_most):
+    """Functions that draw the parts of a figure, by name."""
+    numbered = enumerate(parts(records, at_most))
+    return {name if i == 0 else f"{name}-{i + 1}": partial(draw, saved, part) for i, part in numbered}
+
+
 def _split(name, draw, saved, records, at_most):
-    return {name if i == 0 else f"{name}-{i + 1}": draw(saved, part) for i, part in enumerate(parts(records, at_most))}
+    return {n: make() for n, make in _makers(name, draw, saved, records, at_most).items()}
 
 
 def save_figures(folder: Path, out: Path) -> list[Path]:

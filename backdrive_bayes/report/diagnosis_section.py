@@ -70,9 +70,15 @@ def _details(saved, figures) -> list[Block]:
     parts = (
         ("Which effect", [*tables.probabilities(saved), *tables.effect_parameters(saved)] if saved.effects else []),
         ("Next test", next_test(saved)),
-        ("How far it shrinks", tables.shrink(saved)),
-        ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved)]),
+        ("How far it shrinks", tables.shrink(saved) if _added(saved) else []),
+        ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved)] if _added(saved) else []),
         ("", tables.convergence(saved) if saved.effects else []),
         ("Where the gap lies", [*mapped, *pictures("gap-residual")[:1]] if saved.effects else []),
     )
     return [b for name, blocks in parts if blocks for b in (*([Heading(name)] if name else []), *blocks)]
+
+
+def _added(saved):
+    """Whether anything was added to the model: an unknown cause alone changes nothing on held-out data."""
+    closed = saved.shrink.get("closed_fraction") or {}
+    return saved.effects != ["unknown"] or any(closed.get(end) for end in ("lo", "hi"))

@@ -36,7 +36,7 @@ FIRST_ONLY = ("loop", "modules")
 def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``fit`` and lay out its pages."""
     saved = Saved.read(folder)
-    figures = {n: f for n, f in figures_of(saved).items() if _shown(n)}
+    figures = figures_of(saved, _shown)
     level = saved.indicators["level"]
     converged = bool(saved.indicators["convergence"]["converged"])
     shown = ["loop"]
