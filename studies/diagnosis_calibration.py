@@ -1,217 +1,185 @@
-"""Temperatures and priors of the diagnosis, set on units of the virtual bench.
+"""Naming across benches: weigh labelled units, set the calibration on all benches but one, score it on that one.
 
-    python studies/diagnosis_calibration.py weigh --units 160 --out reports/diagnosis-calibration
-    python studies/diagnosis_calibration.py set --out reports/diagnosis-calibration
+    python studies/diagnosis_calibration.py weigh FOLDER NAME [--key KEY.json] [--workers 2]
+    python studies/diagnosis_calibration.py set
 
-``weigh`` draws units as a blind check does and keeps the log evidences of every hypothesis (evidences.jsonl, one line a unit;
-units that are there already are left alone). Every fifth unit is weighed once more with its true effect taken out of the library:
-the right answer is then unknown. Each line bears a fingerprint of the code behind it; others are not mixed in. ``set`` finds
-the calibration of highest mean log score over those units, and tells by five-fold cross-validation what it is worth on units that
-it has not seen (calibration.json).
+FOLDER holds unit folders and a key as studies/make_bench.py writes them. ``weigh`` saves log Bayes factors, what each hypothesis
+leaves and the operator's properties to reports/diagnosis-calibration/NAME.json; ``set`` reads all of these, prints and writes the
+left-out scores and the calibration that is best for all.
 """
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import argparse
 import json
-import time
-import warnings
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
-from code_hash import code_hash
+from scipy.optimize import minimize
 
-from backdrive_bayes.bench.unit import draw_unit
-from backdrive_bayes.blind.calibration import calibration
-from backdrive_bayes.blind.key import label_of
-from backdrive_bayes.blind.request import Request, assign, draw_plan
-from backdrive_bayes.gap.candidates import MISFIT_LEVELS, UNKNOWN_LEVELS, weigh_all
-from backdrive_bayes.gap.fast import weigh_fast
-from backdrive_bayes.gap.probabilities import CALIBRATION, Evidences, credible_set, marginal, probabilities
-from backdrive_bayes.gap.setting import Setting
-from backdrive_bayes.model.registry import BASELINE, candidates_beside
+from backdrive_bayes.engine.infer import prepare
+from backdrive_bayes.gap.hypotheses import weigh
+from backdrive_bayes.gap.probabilities import CALIBRATION, Calibration, credible_set, labels, probabilities
+from backdrive_bayes.gap.properties import find_properties
+from backdrive_bayes.records.unit_folder import read_unit
 
-SEED = 77
-SEVERITIES = (1.0, 0.4, 0.2, 0.1)
-UNKNOWN = "unknown"
-CANDIDATES = candidates_beside(BASELINE)
-WEIGHED_LATER = ("probabilities.py", "diagnose.py", "draws.py", "next_test.py", "shrink.py", "where.py")
-DIRT = (0.5, 3.0)
-"""Level of the small faults that every bench has, from cleaner than usual to dirtier."""
+HOME = Path(__file__).parents[1] / "reports" / "diagnosis-calibration"
+FLOOR = 1e-3
+"""Probability below which a log score counts no further."""
+SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 
 
-def fingerprint() -> str:
-    """Hash of the code that the evidences come from; what turns them into probabilities is not part of it."""
-    return code_hash(("bench", "blind", "gap", "inference", "model", "records"), WEIGHED_LATER)
-
-
-def weigh(job) -> dict:
-    """Evidences of one unit, with its truth; without its first effect in the library if so asked."""
-    warnings.simplefilter("ignore")
-    index, effects, removed, code = job
-    rng = np.random.default_rng([SEED, index])
-    bench = draw_unit(rng, effects, plan=draw_plan(Request(1), rng), soil=float(rng.uniform(*DIRT)))
-    began, rng = time.perf_counter(), np.random.default_rng(0)
-    setting = Setting.of(bench.unit, rng, BASELINE)
-    truth = label_of(bench.truth.answer)
-    allowed = [name for name in CANDIDATES if name != truth] if removed else None
-    candidates = weigh_all(setting, rng, allowed=allowed)
-    fast, candidates = weigh_fast(setting, candidates)
-    planted = [
-        {"name": p.name, "severity": p.severity, "height": round(p.height, 2), "limited": bool(p.limited)}
-        for p in bench.truth.planted
-    ]
+def weigh_unit(folder: Path, truth: dict) -> dict:
+    """What a diagnosis rests on for one unit, ready for JSON, with the answer that is right."""
+    weighed = weigh(prepare(read_unit(folder)))
+    found = find_properties(weighed.linear, np.random.default_rng(0))
     return {
-        "index": index, "removed": removed, "truth": UNKNOWN if removed else truth,
-        "severity": min(effects.values(), default=None), "planted": planted, "code": code,
-        "evidences": Evidences.of(candidates, fast.within(allowed)).as_json(), "seconds": time.perf_counter() - began,
-    }  # fmt: skip
+        "answer": sorted({"unknown" if e.startswith("x_") else e for e in truth["effects"]}),
+        "effects": truth["effects"],
+        "severity": truth["size"],
+        "log_factor": {"+".join(h): round(v, 2) for h, v in weighed.log_factor.items()},
+        "left": {"+".join(h): round(v, 3) for h, v in weighed.left.items()},
+        "properties": {p.name: round(p.probability, 4) for p in found},
+    }
 
 
-def told(result, chosen=CALIBRATION) -> dict[str, float]:
-    """Probabilities by label under a calibration."""
-    if not isinstance(result["evidences"], Evidences):
-        result["evidences"] = Evidences.from_json(result["evidences"])
-    labels = marginal(probabilities(result["evidences"], chosen))
-    return {label_of(name.split("+")) if name != "none" else name: p for name, p in labels.items()}
+def run_weigh(args) -> None:
+    """Weigh every unit of a folder."""
+    key = json.loads((args.key or args.folder / "key.json").read_text())
+    with ProcessPoolExecutor(args.workers) as pool:
+        jobs = {c: pool.submit(weigh_unit, args.folder / c, truth) for c, truth in key.items()}
+        rows = {}
+        for case, job in jobs.items():
+            try:
+                rows[case] = job.result()
+            except Exception as error:  # a unit that cannot be read is a row with its error, and counts as missed
+                rows[case] = {"error": repr(error)[:200], "answer": sorted(key[case]["effects"]), "effects": key[case]["effects"]}
+            print(case, "+".join(rows[case]["answer"]) or "none", flush=True)
+    HOME.mkdir(parents=True, exist_ok=True)
+    (HOME / f"{args.name}.json").write_text(json.dumps(rows, indent=0))
 
 
-def run(options):
-    """Weigh the units that are not there yet."""
-    options.out.mkdir(parents=True, exist_ok=True)
-    path = options.out / "evidences.jsonl"
-    done = {(r["index"], r["removed"]) for r in read(path)} if path.exists() else set()
-    effects = assign(Request(options.units, SEVERITIES, seed=SEED), np.random.default_rng([SEED, 0]))
-    jobs = []
-    for i, chosen in enumerate(effects):
-        listed = len(chosen) == 1 and next(iter(chosen)) in CANDIDATES
-        jobs += [(i, chosen, removed, fingerprint()) for removed in (False, True) if not removed or (listed and i % 5 == 0)]
-    with ProcessPoolExecutor(options.workers) as pool, path.open("a") as file:
-        for result in pool.map(weigh, [job for job in jobs if (job[0], job[2]) not in done]):
-            file.write(json.dumps(result) + "\n")
-            file.flush()
-            show(result)
+def read_benches() -> dict[str, list[dict]]:
+    """Saved rows by bench."""
+    return {p.stem: list(json.loads(p.read_text()).values()) for p in sorted(HOME.glob("*.json"))}
 
 
-def read(path) -> list[dict]:
-    """Evidences kept so far, all of the present code. Raises ValueError where some are not."""
-    results = [json.loads(line) for line in path.read_text().splitlines()]
-    if any(r.get("code") != fingerprint() for r in results):
-        raise ValueError(f"{path}: evidences of other code; give another --out")
-    return results
+def answers(row: dict, calibration: Calibration) -> dict[str, float]:
+    """Probabilities of a unit's answers."""
+    if "error" in row:
+        return {"none": 0.0, "unknown": 0.0}
+
+    def tuples(table):
+        return {tuple(k.split("+")) if k else (): v for k, v in table.items()}
+
+    return labels(probabilities(tuples(row["log_factor"]), tuples(row["left"]), row["properties"], calibration))
 
 
-def show(result):
-    """One line a unit."""
-    labels = told(result)
-    top = list(labels.items())[:3]
-    names = [f"{p['name']} {p['severity']} ({p['height']:.1f})" for p in result["planted"]]
-    verdict = "ok " if top[0][0] == result["truth"] else "BAD"
-    said = [f"{k} {v:.2f}" for k, v in top]
-    index = f"{result['index']}{' removed' * result['removed']}"
-    print(index, verdict, result["truth"], names, said, f"{result['seconds']:.0f} s", flush=True)
+def right(row: dict) -> str:
+    """Name of the right answer."""
+    return "unknown" if "unknown" in row["answer"] else "+".join(row["answer"]) or "none"
 
 
-def falling(rate, count):
-    """Weights that fall by exp(-rate) from each to the next and sum to one."""
-    weights = np.exp(-rate * np.arange(count))
-    return tuple((weights / weights.sum()).tolist())
+def log_score(rows, calibration) -> float:
+    """Mean log probability of the right answer."""
+    return float(np.mean([np.log(max(answers(r, calibration).get(right(r), 0.0), FLOOR)) for r in rows]))
 
 
-GRID = {
-    "cool": (1.5, 2.0, 2.5, 3.5, 5.0), "warm": (4.0, 6.0, 9.0, 13.0), "halfway": (10.0, 20.0, 40.0, 80.0),
-    "remainder": (0.1, 0.3, 1.0), "slack": (0.0, 0.02, 0.05, 0.1), "unknown": (0.05, 0.1, 0.2, 0.3),
-    "formula": ((0.4, 0.4, 0.2), (0.6, 0.38, 0.02), (0.75, 0.22, 0.03), (0.9, 0.09, 0.01)),
-    "misfit": tuple(falling(r, len(MISFIT_LEVELS)) for r in (0.3, 0.7, 1.5)),
-    "unknown_level": tuple(falling(r, len(UNKNOWN_LEVELS)) for r in (-1.0, 0.0, 1.0)),
-    "pair": (0.002, 0.005, 0.01, 0.02, 0.03), "none": (0.3, 0.4, 0.5, 0.6), "fast_temperature": (5.0, 8.0, 12.0),
-    "fast": (0.05, 0.1, 0.2), "imprint": (2.0, 3.4), "beside": (0.1, 0.3, 1.0),
-}  # fmt: skip
-"""Values that are tried, one entry of the calibration after another."""
+def best_calibration(benches) -> Calibration:
+    """The calibration with the best mean log score over benches, each counted alike, near the present one."""
+
+    def of(x):
+        values = dict(zip(SET, x, strict=True))
+        values["cool"], values["warm"] = float(np.exp(x[0])), float(np.exp(x[1]))
+        for name in ("single", "second", "wave", "unlisted", "beside"):
+            values[name] = min(float(values[name]), 0.0)
+        values["misfit"], values["usual"] = max(float(values["misfit"]), 0.0), float(np.clip(values["usual"], 0.9, 4.0))
+        return replace(CALIBRATION, **values)
+
+    start = np.array([getattr(CALIBRATION, n) for n in SET])
+    start[:2] = np.log(start[:2])
+
+    def cost(x):
+        return -np.mean([log_score(rows, of(x)) for rows in benches]) + 0.002 * np.sum((x - start) ** 2)
+
+    simplex = np.vstack([start, start + np.diag(np.r_[0.6, 0.8, np.ones(start.size - 2)])])
+    found = minimize(cost, start, method="Nelder-Mead", options={"maxiter": 400, "initial_simplex": simplex, "fatol": 1e-3})
+    return of(found.x)
 
 
-def find(results, passes: int = 2):
-    """The calibration of the highest mean log score by going through the grid entry by entry, from the present one."""
+def scores(rows, calibration) -> dict[str, float]:
+    """Scores of one bench."""
+    top = [next(iter(answers(r, calibration))) for r in rows]
+    sets = [credible_set(answers(r, calibration), calibration.cover) for r in rows]
+    hit = np.array([t == right(r) for t, r in zip(top, rows, strict=True)])
+    kind = np.array([right(r) for r in rows])
+    strong = np.array([len(r["answer"]) == 1 and right(r) != "unknown" and r.get("severity", 0) >= 0.4 for r in rows])
 
-    def loss(chosen):
-        return -np.mean([np.log(max(told(r, chosen).get(r["truth"], 0.0), 1e-3)) for r in results])
+    def share(chosen):
+        return float(hit[chosen].mean()) if chosen.any() else float("nan")
 
-    best, least = CALIBRATION, loss(CALIBRATION)
-    for _ in range(passes):
-        for name, values in GRID.items():
-            tried = [replace(best, **{name: value}) for value in values]
-            losses = [loss(chosen) for chosen in tried]
-            if min(losses) < least - 1e-4:
-                best, least = tried[int(np.argmin(losses))], min(losses)
-    return best
-
-
-def kinds_of(pairs) -> dict:
-    """Results and forecasts by what was asked: listed effects, pairs, unlisted ones, those taken out of the library, none."""
-    kinds = {}
-    for result, forecast in pairs:
-        unlisted = "unlisted" if result["truth"] == UNKNOWN else "pair" if "+" in result["truth"] else "listed"
-        kinds.setdefault("removed" if result["removed"] else "none" if result["truth"] == "none" else unlisted, []).append(
-            (result, forecast)
-        )
-    return kinds
+    unlisted = kind == "unknown"
+    return {
+        "units": len(rows),
+        "exact": float(hit.mean()),
+        "strong": share(strong),
+        "none": share(kind == "none"),
+        "unlisted": share(unlisted),
+        "listed for unlisted": float(np.mean([t not in ("none", "unknown") for t, u in zip(top, unlisted, strict=True) if u])),
+        "pairs": share(np.array(["+" in k for k in kind])),
+        "sets cover": float(np.mean([right(r) in s for r, s in zip(rows, sets, strict=True)])),
+        "answers a set": float(np.mean([len(s) for s in sets])),
+        "log score": log_score(rows, calibration),
+    }
 
 
-def score(results, forecasts) -> dict:
-    """Hit rates by severity, set coverage and size, false alarms, calibration."""
+def run_set(args) -> None:
+    """Left-out scores and the calibration for all benches."""
+    benches = read_benches()
     table = {}
-    for severity in (None, *SEVERITIES):
-        own = [(r, f) for r, f in zip(results, forecasts, strict=True) if r["severity"] == severity]
-        for kind, mine in kinds_of(own).items():
-            table[f"{'none' if severity is None else f'{severity:g}'} {kind}"] = {
-                "units": len(mine), "right": sum(max(f, key=f.get) == r["truth"] for r, f in mine),
-            }  # fmt: skip
-    sets = [credible_set(f) for f in forecasts]
-    truths = [r["truth"] for r in results]
-    found = calibration(forecasts, truths)
-    top = found["top"]
-    return {
-        "right": table, "set_coverage": float(np.mean([t in s for t, s in zip(truths, sets, strict=True)])),
-        "set_size": float(np.mean([len(s) for s in sets])), "calibration_error": top["expected_error"],
-        "mean_probability": top["mean_probability"], "hit_rate": top["hit_rate"], "log_score": found["log_score"]["mean"],
-    }  # fmt: skip
+    for name, rows in benches.items():
+        others = best_calibration([r for n, r in benches.items() if n != name])
+        table[name] = scores(rows, others)
+        print(name, {k: round(v, 2) for k, v in table[name].items()}, flush=True)
+    everything = best_calibration(list(benches.values()))
+    print(everything)
+    write_readme(table, everything)
 
 
-def settle(options):
-    """Find the calibration and write what it is worth."""
-    results = read(options.out / "evidences.jsonl")
-    units = sorted({r["index"] for r in results})
-    fold_of = dict(zip(units, np.random.default_rng(0).permutation(len(units)) % 5, strict=True))
-    fold = np.array([fold_of[r["index"]] for r in results])
-    unseen = [None] * len(results)
-    for k in range(5):
-        chosen = find([r for r, f in zip(results, fold, strict=True) if f != k])
-        for i in np.flatnonzero(fold == k):
-            unseen[i] = told(results[i], chosen)
-    best = find(results)
-    summary = {
-        "units": len(results), "calibration": asdict(best), "cross_validated": score(results, unseen),
-        "as_set_now": score(results, [told(r) for r in results]), "seen": score(results, [told(r, best) for r in results]),
-    }  # fmt: skip
-    (options.out / "calibration.json").write_text(json.dumps(summary, indent=1, default=float))
-    print(json.dumps(summary, indent=1, default=float))
+def write_readme(table, calibration) -> None:
+    """The result as a page."""
+    columns = list(next(iter(table.values())))
+    lines = ["# Naming across benches", ""]
+    lines += ["Each bench scored with the calibration that was set on all others (`studies/diagnosis_calibration.py set`).", ""]
+    lines += ["| bench | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
+    for name, row in table.items():
+        shown = [f"{v:.0f}" if c == "units" else f"{v:.2f}" for c, v in row.items()]
+        lines.append(f"| {name} | " + " | ".join(shown) + " |")
+    values = ", ".join(f"{f.name} {getattr(calibration, f.name):.2f}" for f in fields(calibration))
+    lines += ["", f"Set on all benches: {values}.", ""]
+    lines += [
+        "`foreign` are the labelled units of a bench whose code is not here (set 1 and foreign-1, 104 units); the others are units",
+        "of this project's four benches, made by `studies/make_bench.py --units 60 --seed 101`.",
+        "",
+    ]
+    (HOME / "README.md").write_text("\n".join(lines))
 
 
-def main():
-    """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("step", choices=("weigh", "set"))
-    parser.add_argument("--units", type=int, default=160)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("reports/diagnosis-calibration"))
-    options = parser.parse_args()
-    {"weigh": run, "set": settle}[options.step](options)
+def main() -> None:
+    """Parse the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    verbs = parser.add_subparsers(required=True)
+    one = verbs.add_parser("weigh")
+    one.add_argument("folder", type=Path)
+    one.add_argument("name")
+    one.add_argument("--key", type=Path)
+    one.add_argument("--workers", type=int, default=1)
+    one.set_defaults(run=run_weigh)
+    verbs.add_parser("set").set_defaults(run=run_set)
+    args = parser.parse_args()
+    args.run(args)
 
 
 if __name__ == "__main__":

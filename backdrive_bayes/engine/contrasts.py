@@ -1,6 +1,7 @@
 """Evidence for what breaks a symmetry: effects weighed in what the class cannot hold.
 
-The class is integrated under a prior ``WIDENED`` times wider than what the unit taught, so that an effect gains nothing by drawing
+The class is integrated under a prior ``WIDENED`` times wider than what the unit taught, so that an effect gains
+nothing by drawing
 again what the class has learnt already (columns made from the prediction look like the loop itself). What is left are
 contrasts: between mirrored branches, rates, times and legs.
 """
@@ -27,7 +28,8 @@ SIZE_WEIGHTS = np.array([0.25, 0.5, 0.25])
 class Contrasts:
     """Effects' columns and the data with the class integrated: Gram matrices of what is left.
 
-    ``gram`` (weights, weights), ``moment`` (weights,), ``total``; ``index`` numbers the group of a weight; ``samples`` is the number of
+    ``gram`` (weights, weights), ``moment`` (weights,), ``total``; ``index`` numbers the group of a weight;
+    ``samples`` is the number of
     independent contrasts.
     """
 

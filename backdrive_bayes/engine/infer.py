@@ -18,9 +18,9 @@ from backdrive_bayes.mechanics.registry import BENCH, all_effects
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
-
 POWER = 1.0 / 3.0
-"""Power of the likelihood from which intervals are drawn (a coarsened posterior: Miller and Dunson, JASA 114, 2019): no reducer is
+"""Power of the likelihood from which intervals are drawn (a coarsened posterior: Miller and Dunson, JASA 114, 2019):
+no reducer is
 quite of the class, and at full power 90 % intervals of reducers from benches that share nothing with it hold the truth in about
 80 of 100 cases (studies/coverage.py)."""
 
@@ -60,7 +60,9 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
         effects=linear.effects,
         context=reduced.context,
         records=_facts(reduced),
-        weights=dict(zip(names, np.split(drawn.weights, np.cumsum([g.width for g in linear.design.groups])[:-1], axis=-1), strict=True)),
+        weights=dict(
+            zip(names, np.split(drawn.weights, np.cumsum([g.width for g in linear.design.groups])[:-1], axis=-1), strict=True)
+        ),
         log_scale={n: drawn.log_scale[..., i] for i, n in enumerate(names)},
         log_density=drawn.log_density,
         predicted_rad=tuple(p * reduced.angle_scale_rad for p in linear.predicted),

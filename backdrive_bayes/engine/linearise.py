@@ -1,4 +1,5 @@
-"""The mode of the few nonlinear parameters, with every listed effect present under a wide scale, and the linear model about it."""
+"""The mode of the few nonlinear parameters, with every listed effect present under a wide scale, and the linear
+model about it."""
 
 from __future__ import annotations
 
@@ -52,7 +53,8 @@ class Linear:
     """The linear model of a unit about its mode.
 
     ``design`` holds the class and every effect, ``angles`` what its weights explain (tangent effects counted from an undistorted
-    bench), ``covariances`` the noise; ``log_scale`` and ``solution`` are those of the joint model, ``predicted`` its block means of the angle.
+    bench), ``covariances`` the noise; ``log_scale`` and ``solution`` are those of the joint model, ``predicted`` its
+    block means of the angle.
     """
 
     reduced: Reduced
@@ -201,7 +203,9 @@ class _Search:
 
     def _moved(self, linear):
         weights = linear.weights
-        tangent = {e.parameter: float(weights[e.name][0]) for e in self.effects if isinstance(e, TangentEffect) and e.name in weights}
+        tangent = {
+            e.parameter: float(weights[e.name][0]) for e in self.effects if isinstance(e, TangentEffect) and e.name in weights
+        }
         return replace(linear.distortion, **tangent)
 
 
@@ -245,7 +249,8 @@ def _apart(starts, context):
 
 
 def _refined(linear) -> np.ndarray | None:
-    """Knots with those intervals split in four in which settled blocks leave a conspicuous residual; None if nothing is gained."""
+    """Knots with those intervals split in four in which settled blocks leave a conspicuous residual; None if nothing
+    is gained."""
     reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
     for blocks, white in zip(reduced.blocks, linear.residuals(), strict=True):
         low, high = np.abs(blocks.edges_nm()) / reduced.torque_scale_nm

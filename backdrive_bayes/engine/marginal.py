@@ -21,7 +21,8 @@ SWEEPS = 40
 class Solution:
     """Posterior of the weights at given scales.
 
-    ``mean`` (weights,), ``root`` (weights, weights) with covariance root·rootᵀ·``variance``, ``chi2`` what remains, ``log_marginal``
+    ``mean`` (weights,), ``root`` (weights, weights) with covariance root·rootᵀ·``variance``, ``chi2`` what remains,
+    ``log_marginal``
     the log marginal likelihood up to a constant of the data and the noise.
     """
 

@@ -24,7 +24,8 @@ WHITE_SHARE = 0.2
 class Jitter:
     """Jitter of the crossing torques: clearances do not cross at the same torque twice.
 
-    ``torque`` is its standard deviation and ``length`` the torque over which it is correlated within a leg, in shares of the scale.
+    ``torque`` is its standard deviation and ``length`` the torque over which it is correlated within a leg, in
+    shares of the scale.
     """
 
     torque: float
@@ -93,7 +94,9 @@ class Reduced:
 
     def without(self, record: int) -> Reduced:
         """The unit less one record."""
-        return replace(self, blocks=self.blocks[:record] + self.blocks[record + 1 :], noise=self.noise[:record] + self.noise[record + 1 :])
+        return replace(
+            self, blocks=self.blocks[:record] + self.blocks[record + 1 :], noise=self.noise[:record] + self.noise[record + 1 :]
+        )
 
 
 def reduce_unit(unit: Unit, blocks_per_leg: int | None = None) -> Reduced:

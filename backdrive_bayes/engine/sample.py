@@ -127,7 +127,8 @@ def _thin(drawn):
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """How compressed weights make the columns' own: ``turn`` (weights, compressed); ``rest`` (weights, left) are directions that the
+    """How compressed weights make the columns' own: ``turn`` (weights, compressed); ``rest`` (weights, left) are
+    directions that the
     data do not see; ``group`` and ``rest_group`` number their scales."""
 
     turn: np.ndarray
@@ -137,7 +138,8 @@ class Basis:
 
 
 SEEN = 0.05
-"""Share of the noise below which a direction of the weights is not seen by the data: it moves log marginal likelihoods by 1e-3."""
+"""Share of the noise below which a direction of the weights is not seen by the data: it moves log marginal
+likelihoods by 1e-3."""
 ABOVE = 1.5
 """How far above its mode a log scale may lie for that."""
 

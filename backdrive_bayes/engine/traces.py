@@ -11,7 +11,8 @@ HEIGHT = 0.3
 
 
 def trace_of(linear: Linear, effect) -> float:
-    """Trace level of an effect's weights: its own; for an exponent of the rate what moves the angle by HEIGHT, if that is more."""
+    """Trace level of an effect's weights: its own; for an exponent of the rate what moves the angle by HEIGHT, if
+    that is more."""
     own = effect.trace(linear.reduced.context)
     if not getattr(effect, "parameter", "").endswith("exponent") or effect.name not in linear.design.names:
         return own

@@ -82,7 +82,9 @@ def _withheld(linear: Linear, baseline) -> dict[str, float]:
     found = {}
     for module in BASELINE:
         if module not in baseline:
-            names = {p.name for p in linear.reducer.parts if p.module == module} | ({"floating"} if module == "geometric" else {"initial"})
+            names = {p.name for p in linear.reducer.parts if p.module == module} | (
+                {"floating"} if module == "geometric" else {"initial"}
+            )
             scale = np.exp([linear.log_scale[n] for n in linear.design.names])
             without = np.where(np.isin(linear.design.names, list(names)), 1e-6, scale)
             gain = linear.data.log_marginal(scale[linear.design.index]) - linear.data.log_marginal(without[linear.design.index])
@@ -165,7 +167,13 @@ class _Found:
         for effects, p in self.joint.items():
             named = [e for e in effects if e in modules]
             # A module stays named where something unlisted acts beside it.
-            rest = [] if "unknown" in effects and named else ["unknown"] if "unknown" in effects else [e for e in effects if e not in modules]
+            rest = (
+                []
+                if "unknown" in effects and named
+                else ["unknown"]
+                if "unknown" in effects
+                else [e for e in effects if e not in modules]
+            )
             name = "+".join([*named, *rest]) or "none"
             found[name] = found.get(name, 0.0) + p
         return dict(sorted(found.items(), key=lambda item: -item[1]))

@@ -47,7 +47,9 @@ def _tests(linear):
 
 
 def _path(turning, rate, dwell_s=0.0) -> History:
-    torque = np.concatenate([np.linspace(a, b, POINTS)[:-1] for a, b in zip(turning[:-1], turning[1:], strict=True)] + [turning[-1:]])
+    torque = np.concatenate(
+        [np.linspace(a, b, POINTS)[:-1] for a, b in zip(turning[:-1], turning[1:], strict=True)] + [turning[-1:]]
+    )
     time = np.r_[0.0, np.cumsum(np.abs(np.diff(torque)))] / rate
     leg = np.repeat(np.arange(turning.size - 1), POINTS - 1)
     return through(time + dwell_s * np.r_[0, leg], torque, 1.0)

@@ -1,6 +1,7 @@
 """From log Bayes factors to probabilities over {none, effects, pairs, unknown}.
 
-Bayesian model comparison is too sure of itself where all models are slightly wrong. Log Bayes factors are divided by a temperature
+Bayesian model comparison is too sure of itself where all models are slightly wrong. Log Bayes factors are divided by
+a temperature
 that grows with what there is to explain (a coarsened posterior: Miller and Dunson, JASA 114, 2019), and the numbers of
 :class:`Calibration` were set on labelled units of virtual benches, each scored while left out (studies/diagnosis_calibration.py).
 """
@@ -19,8 +20,10 @@ UNKNOWN, WAVE = "unknown", "encoder_error"
 class Calibration:
     """Temperature ``cool`` + ``warm`` · (largest log Bayes factor), and log prior weights relative to none.
 
-    ``single`` is that of one listed effect, ``second`` the further one of a second, ``wave`` the further one of an encoder error (any
-    period may come by), ``unlisted`` that of something unlisted, ``beside`` its further one beside a listed effect; ``misfit`` times the
+    ``single`` is that of one listed effect, ``second`` the further one of a second, ``wave`` the further one of an
+    encoder error (any
+    period may come by), ``unlisted`` that of something unlisted, ``beside`` its further one beside a listed effect;
+    ``misfit`` times the
     logarithm of the contrasts' variance beyond ``usual`` speaks for something unlisted. ``cover`` is what a 90 % set must gather.
     """
 
@@ -47,7 +50,8 @@ def probabilities(
 ) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects, () for none; they sum to one.
 
-    ``log_factor`` are log Bayes factors against none, ``left`` is the variance of the contrasts in noise units that each set without
+    ``log_factor`` are log Bayes factors against none, ``left`` is the variance of the contrasts in noise units that
+    each set without
     something unlisted leaves, ``properties`` the probabilities of effects inside the class, each taken alone.
     """
     temperature = calibration.cool + calibration.warm * max(0.0, *log_factor.values())

@@ -1,6 +1,7 @@
 """How far the gap shrinks on data left out of the fit once an effect is added, with a control that names no cause beside it.
 
-Records are held out in turn, or legs where there is one record. Weights are those of the rest; what belongs to the held-out record
+Records are held out in turn, or legs where there is one record. Weights are those of the rest; what belongs to the
+held-out record
 alone (its offset, initial state, drift) is fitted to it under its prior, for no other record tells it.
 """
 
@@ -44,7 +45,8 @@ def fit_hypothesis(linear: Linear, effects, design: Design, priors) -> Fitted:
 class Shrink:
     """What is held out, piece by piece, arrays of shape (pieces,).
 
-    ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``, ``control`` and ``floor``
+    ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``,
+    ``control`` and ``floor``
     are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the control, and noise.
     """
 
@@ -64,7 +66,8 @@ class Shrink:
     def closed(self, part: str, rng, level: float, fold: int | None = None) -> dict:
         """Closed fraction of ``after`` or ``control`` with its central interval by a Bayesian bootstrap over folds and pieces.
 
-        Source: Rubin, Annals of Statistics 9, 1981. Of fewer than ``FEWEST_PIECES`` pieces there is none: both ends are the value.
+        Source: Rubin, Annals of Statistics 9, 1981. Of fewer than ``FEWEST_PIECES`` pieces there is none: both ends
+        are the value.
         """
         own = np.full(self.fold.size, True) if fold is None else self.fold == fold
         folds, number = np.unique(self.fold[own], return_inverse=True)

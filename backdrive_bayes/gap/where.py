@@ -32,7 +32,9 @@ class Gap:
     @property
     def rms_rad(self) -> float:
         """Root mean square of the mean, weighted by torque."""
-        return float(np.sqrt(sum(w @ m**2 for w, m in zip(self.weight, self.mean, strict=True)) / sum(w.sum() for w in self.weight)))
+        return float(
+            np.sqrt(sum(w @ m**2 for w, m in zip(self.weight, self.mean, strict=True)) / sum(w.sum() for w in self.weight))
+        )
 
 
 def estimate_gap(linear: Linear, rng) -> Gap:

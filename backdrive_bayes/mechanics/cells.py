@@ -57,7 +57,8 @@ class Cells:
         return Cells(up, down, scale * self.width, scale * self.norm)
 
     def means(self, history: History, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
-        """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks that differ)."""
+        """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
+        that differ)."""
         return self._paired(_means, history, state, (history.z0, history.z1, history.weight, history.block, history.blocks), sign)
 
     def ends(self, history: History, state: str = "neutral", sign: float = 1.0) -> np.ndarray:

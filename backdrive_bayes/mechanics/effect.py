@@ -13,7 +13,8 @@ from backdrive_bayes.mechanics.history import History
 class Context:
     """What effects may know of a unit; torques are shares of the largest torque, angles of the angle scale.
 
-    ``rate`` (records,) are loading rates [1/s], ``duration_s`` (records,); ``angle_noise`` and ``torque_noise`` standard deviations
+    ``rate`` (records,) are loading rates [1/s], ``duration_s`` (records,); ``angle_noise`` and ``torque_noise``
+    standard deviations
     of block means and of single torque samples.
     """
 
@@ -34,7 +35,8 @@ class Context:
 class Effect:
     """A candidate effect.
 
-    ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring channel, ``per_record``
+    ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
+    channel, ``per_record``
     says whether each record has weights of its own. ``trace`` and ``present`` give the standard deviation of its (independent)
     weights where it is a mere trace, as on every bench, and where it acts.
     """

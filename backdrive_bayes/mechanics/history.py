@@ -16,7 +16,8 @@ PIECES = 3
 class History:
     """Segments of a torque history; all but ``start`` and ``blocks`` have shape (segments,).
 
-    ``z0`` and ``z1`` are the torques at the ends as shares of the unit's largest torque, ``t0`` and ``t1`` the times [s], ``block``
+    ``z0`` and ``z1`` are the torques at the ends as shares of the unit's largest torque, ``t0`` and ``t1`` the times
+    [s], ``block``
     the block that a segment belongs to and ``weight`` its share of the block's time.
     """
 
@@ -34,7 +35,8 @@ class History:
         return float(self.z0[0])
 
     def mean(self, begin, end) -> np.ndarray:
-        """Block means (blocks, columns) of quantities that are straight on every segment, given at its ends (segments, columns)."""
+        """Block means (blocks, columns) of quantities that are straight on every segment, given at its ends
+        (segments, columns)."""
         out = np.zeros((self.blocks, begin.shape[1]))
         np.add.at(out, self.block, 0.5 * (begin + end) * self.weight[:, None])
         return out

@@ -33,7 +33,8 @@ BASELINE = ("geometric", "elastic", "friction")
 class Part:
     """One part of the class: its cells, and ``mixing`` (cells, cells) that turns independent weights into the prior's.
 
-    ``log_scale`` is mean and standard deviation of the normal prior on the log standard deviation of the weights, in shares of the
+    ``log_scale`` is mean and standard deviation of the normal prior on the log standard deviation of the weights, in
+    shares of the
     angle scale.
     """
 
@@ -104,7 +105,9 @@ class ReducerClass:
         if part:
             cells = self._cells(part, exponents, log_rate)
             moved = cells.means(history, "upper") - cells.means(history)
-            weights = np.abs(clearance_weights) if clearance_weights is not None else np.full(cells.count, np.exp(part.log_scale[0]))
+            weights = (
+                np.abs(clearance_weights) if clearance_weights is not None else np.full(cells.count, np.exp(part.log_scale[0]))
+            )
             total = np.cumsum(weights)
             zone = np.minimum(ZONES * (total - 0.5 * weights) / max(total[-1], 1e-300), ZONES - 1e-9).astype(int)
             found["floating"] = np.stack([moved[:, zone == k] @ weights[zone == k] for k in range(ZONES)], axis=1)

@@ -25,7 +25,9 @@ class AsymmetricStiffness(PathEffect):
         return tuple(np.clip(np.abs(z)[:, None] - NODES[:-1], 0.0, np.diff(NODES)) @ mixing for z in (history.z0, history.z1))
 
 
-ASYMMETRIC_STIFFNESS = AsymmetricStiffness("asymmetric_stiffness", "oddness", "even in the torque", "elastic deflection of two flanks", "rad")
+ASYMMETRIC_STIFFNESS = AsymmetricStiffness(
+    "asymmetric_stiffness", "oddness", "even in the torque", "elastic deflection of two flanks", "rad"
+)
 
 
 class UnequalFlanks(FlankEffect):

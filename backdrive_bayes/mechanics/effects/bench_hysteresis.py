@@ -19,5 +19,10 @@ class BenchHysteresis(Effect):
 
 
 BENCH_HYSTERESIS = BenchHysteresis(
-    "bench_hysteresis", "none", "loop wider by a small torque", "JCGM 100:2008, F.2.4 (corrections that are not made)", "N·m", False
+    "bench_hysteresis",
+    "none",
+    "loop wider by a small torque",
+    "JCGM 100:2008, F.2.4 (corrections that are not made)",
+    "N·m",
+    False,
 )

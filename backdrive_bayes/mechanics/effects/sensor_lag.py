@@ -16,6 +16,12 @@ class SensorLag(TangentEffect):
 
 
 SENSOR_LAG = SensorLag(
-    "sensor_lag", "rate independence", "width grows with rate times slope", "delay and first-order lag alike, to first order in the lag",
-    "s", False, False, "lag_s",
+    "sensor_lag",
+    "rate independence",
+    "width grows with rate times slope",
+    "delay and first-order lag alike, to first order in the lag",
+    "s",
+    False,
+    False,
+    "lag_s",
 )

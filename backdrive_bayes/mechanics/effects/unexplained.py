@@ -35,4 +35,6 @@ class Unexplained(PathEffect):
         return tuple(found)
 
 
-UNEXPLAINED = Unexplained("unknown", "repeatability", "differs from leg to leg", "Gaussian process along each leg", "rad", False, True)
+UNEXPLAINED = Unexplained(
+    "unknown", "repeatability", "differs from leg to leg", "Gaussian process along each leg", "rad", False, True
+)

@@ -74,6 +74,9 @@ def _play(first, z1, threshold):
 
 
 VISCOELASTIC_CREEP = ViscoelasticCreep(
-    "viscoelastic_creep", "rate independence", "relaxes with time constants of seconds", "Ferry, Viscoelastic Properties of Polymers, 1980, ch. 3",
+    "viscoelastic_creep",
+    "rate independence",
+    "relaxes with time constants of seconds",
+    "Ferry, Viscoelastic Properties of Polymers, 1980, ch. 3",
     "rad",
 )
