@@ -34,11 +34,11 @@ def test_a_diagnosis_shows_its_answer_and_is_evidence_of_its_model(tmp_path):
     from backdrive_bayes.bench.unit import draw_unit
 
     plan = make_plan(rates=(0.4, 2.0), amplitudes=(1.0,), cycles=1, sampling_hz=200.0)
-    unit = draw_unit(np.random.default_rng(5), {"sensor_lag": 4.0}, plan=plan, name="<lag>").unit
+    unit = draw_unit(np.random.default_rng(5), {"torque_offset": 1.0}, plan=plan, name="<offset>").unit
     found = backdrive_bayes.diagnose(unit)
-    assert found.effects == ["sensor_lag"] and found.probabilities["sensor_lag"] > 0.5
+    assert found.effects == ["torque_offset"] and found.probabilities["torque_offset"] > 0.5
     assert sum(found.probabilities.values()) == pytest.approx(1)
-    assert "sensor_lag" in found._repr_html_() and "&lt;lag&gt;" in found._repr_html_()
+    assert "torque_offset" in found._repr_html_() and "&lt;offset&gt;" in found._repr_html_()
     verdict = backdrive_bayes.accept(found, Limits((Limit("peak_angle_rad", hi=1.0),)))
     assert verdict.result["structure"]
     saved = found.save(tmp_path / "out", figures=False)
@@ -129,7 +129,7 @@ def test_an_effect_of_ones_own_is_registered_from_outside(tmp_path):
     code = "from backdrive_bayes.mechanics.registry import all_effects; print('loose_plate' in all_effects())"
     for path, known in ((str(tmp_path), "True"), ("", "False")):
         environment = os.environ | {"PYTHONPATH": path}
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, cwd=ROOT)
         assert done.stdout.strip() == known, done.stderr
 
 

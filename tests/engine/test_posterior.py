@@ -9,6 +9,7 @@ from scipy.stats import binom
 from support.planted import planted
 
 from backdrive_bayes.bench.known_truth import BenchNoise, random_reducer, simulate_unit
+from backdrive_bayes.engine import infer as module
 from backdrive_bayes.engine import sample
 from backdrive_bayes.engine.infer import infer, library_terms
 from backdrive_bayes.engine.linearise import linearise
@@ -22,10 +23,14 @@ NAMES = ("lost_motion_rad", "loop_area_J", "dissipation_ratio", "peak_angle_rad"
 LEAST, MOST = binom.interval(0.99, UNITS, LEVEL)
 
 
-def fitted(unit: Unit, effects=(), seed=0):
-    """A posterior of few blocks and few steps: log scales are drawn roughly, weights exactly."""
+def fitted(unit: Unit, effects=(), seed=0, power=1.0):
+    """A posterior of few blocks and few steps: log scales are drawn roughly, weights exactly.
+
+    At full power: units of the class itself need no coarsened likelihood.
+    """
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in (("WALKERS", 16), ("FIRST_STEPS", 4), ("MOST_STEPS", 4)):
+        patch.setattr(module, "POWER", power)
+        for name, value in (("WALKERS", 16), ("FIRST_STEPS", 6), ("MOST_STEPS", 6)):
             patch.setattr(sample, name, value)
         return infer(linearise(reduce_unit(unit, 30), effects), (), seed)
 
@@ -83,7 +88,7 @@ def ends(posterior):
 
 
 def test_the_last_bits_of_the_data_move_no_interval():
-    """Times, torques and angles times 1 ± 1e-12: no end moves by more than half a per cent of the width."""
+    """Times, torques and angles times 1 ± 1e-12: no end moves by more than a thousandth of the width."""
     unit, rng = planted(), np.random.default_rng(0)
 
     def shaken(values):
@@ -92,9 +97,15 @@ def test_the_last_bits_of_the_data_move_no_interval():
     records = tuple(replace(r, torque_nm=shaken(r.torque_nm), angle_rad=shaken(r.angle_rad)) for r in unit.records)
     here, there = (ends(fitted(u, library_terms())) for u in (unit, replace(unit, records=records)))
     for name in NAMES:
-        assert np.abs(there[name] - here[name]).max() < 0.005 * np.diff(here[name])[0], name
+        assert np.abs(there[name] - here[name]).max() < 0.001 * np.diff(here[name])[0], name
     other = ends(fitted(planted(seed=1), library_terms()))
-    assert any(np.abs(other[n] - here[n]).max() > 0.005 * np.diff(here[n])[0] for n in NAMES), "other noise must move them"
+    assert any(np.abs(other[n] - here[n]).max() > 0.02 * np.diff(here[n])[0] for n in NAMES), "other noise must move them"
+
+
+def test_a_coarsened_posterior_is_wider():
+    unit = planted(loops=((0.1, 0.1),))
+    full, third = (ends(fitted(unit, power=p)) for p in (1.0, 1.0 / 3.0))
+    assert all(np.diff(third[n])[0] > 1.3 * np.diff(full[n])[0] for n in NAMES)
 
 
 def test_one_seed_gives_the_same_bytes():

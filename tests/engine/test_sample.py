@@ -1,5 +1,7 @@
 """Draws against quadrature, the same bytes for one seed, evaluations that are counted, and convergence that is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -139,6 +141,20 @@ def test_unseen_directions_keep_their_prior():
     np.testing.assert_allclose(np.cov(weights.T), expected, atol=0.05 * np.diag(expected).max())
     np.testing.assert_allclose(weights.mean(axis=0), solution.mean, atol=0.02)
     assert np.std(weights[:, -1]) == pytest.approx(np.exp(-1.0) * np.sqrt(solution.variance * dof / (dof - 2)), rel=0.03)
+
+
+def test_signs_and_turns_of_principal_directions_change_no_draw():
+    """Eigenvectors are known up to their sign, those of nothing up to a turn: the last bits of the data choose."""
+    rng = np.random.default_rng(3)
+    data, scales = problem()
+    blind = Whitened(np.hstack([data.x, np.zeros((24, 4))]), data.y, 24, 30.0)
+    more = Scales(np.repeat([0, 1], [3, 7]), scales.mean, scales.sd)
+    small, basis = compress(blind, more, more.mean)
+    sign, turn = rng.choice([-1.0, 1.0], basis.turn.shape[1]), np.linalg.qr(rng.standard_normal((4, 4)))[0]
+    other = replace(basis, turn=basis.turn * sign, rest=basis.rest @ turn)
+    flipped = Whitened(small.x * sign, small.y, small.samples, small.noise_dof)
+    here, there = (draw_weights(d, b, more.mean, 9, np.random.default_rng(0)) for d, b in ((small, basis), (flipped, other)))
+    np.testing.assert_allclose(there, here, atol=1e-12)
 
 
 def test_the_move_proposes_from_its_own_density():

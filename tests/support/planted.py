@@ -1,17 +1,20 @@
 """Units of the class with planted faults, small enough to be analysed within a second or two."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from scipy.signal import lfilter
 
 from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, angle_noise, physical_reducer, ramp
+from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.records.record import Record, Unit
 
 NOISE = BenchNoise()
 LOOPS = ((0.1, 0.02), (0.1, 0.1))
 HERTZ = 400.0
 SCALE = 0.1
+PERIOD_RAD = 0.004
 
 
 def smooth_reducer(extra=None) -> KnownReducer:
@@ -48,6 +51,32 @@ def planted(seed=0, *, known=None, offset_nm=0.0, lag_s=0.0, jitter=None, loops=
 def changed(unit: Unit, change) -> Unit:
     """The unit with ``change(record, index)`` added to the angles [rad]."""
     return replace(unit, records=tuple(replace(r, angle_rad=r.angle_rad + change(r, i)) for i, r in enumerate(unit.records)))
+
+
+def _smooth(extra=None, **options):
+    return planted(known=smooth_reducer(extra), **options)
+
+
+UNITS = {
+    "none": _smooth,
+    "torque_offset": lambda: _smooth(offset_nm=8e-4),
+    "sensor_lag": lambda: _smooth(lag_s=0.03),
+    # A wave that is even in the angle: an odd one is part of an odd loop.
+    "encoder_error": lambda: changed(_smooth(), lambda r, i: 4e-4 * np.cos(2 * np.pi * r.angle_rad / PERIOD_RAD)),
+    "thermal_drift": lambda: changed(_smooth(), lambda r, i: 1.5e-3 * (r.time_s / 20) ** 0.7),
+    "asymmetric_stiffness": lambda: changed(_smooth(), lambda r, i: 0.02 * np.abs(r.torque_nm)),
+    # A step of the reading halfway through the first record.
+    "unknown": lambda: changed(_smooth(), lambda r, i: 1.5e-3 * (r.time_s > 0.55 * r.time_s[-1]) * (i == 0)),
+    "second_backlash": lambda: _smooth((0.15, 0.25, 0.35)),
+    "interface_slip": lambda: _smooth((0.1, 0.75, 1.0)),
+}
+"""Units by what is planted in them."""
+
+
+@cache
+def prepared(name):
+    """The linear model of one of UNITS."""
+    return prepare(UNITS[name]())
 
 
 def _jittered(torque, angle, sd, length, rng):
