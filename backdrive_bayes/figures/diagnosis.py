@@ -71,7 +71,7 @@ def draw(saved: Diagnosed):
     records = mapped(saved)
     row_in = diagnosis_map.row_height_in(saved, *ROW_IN, len(records))
     lines = textwrap.wrap(drawable(saved.inconclusive or saved.summary, 3 * _LINE - 6), _LINE)
-    held = len(diagnosis_closed.rows(saved, records)) if saved.shrink else 0
+    held = len(diagnosis_closed.rows(saved, records)) if saved.added else 0
     heights = (
         0.32 + 0.17 * len(lines),
         max(1.8, 0.85 + 0.19 * bar_lines(saved), 1.0 + 0.22 * held),
@@ -106,11 +106,11 @@ def _which(axes, saved):
 
 
 def _closed(part, axes, saved, records):
-    if not saved.shrink:
+    if not saved.added:
         return _absent(axes, "How far does it close?", "no effect was added to the model")
     diagnosis_closed.draw_before_after(axes, saved, records)
     if saved.effects == ["unknown"]:
-        axes.set_title("How far with the best candidate?", loc="left", fontweight="bold")
+        axes.set_title("How far with the best?", loc="left", fontweight="bold")
     part.legend(
         handles=diagnosis_closed.before_after_handles(),
         loc="outside lower right",

@@ -115,6 +115,12 @@ class Diagnosed:
         return (self.result.get("shrink") or {}) if self.enlarged else {}
 
     @property
+    def added(self) -> bool:
+        """Whether an effect was added to the model: an unknown cause alone adds none, and closes nothing by itself."""
+        closed = self.shrink.get("closed_fraction") or {}
+        return bool(self.shrink) and (self.effects != ["unknown"] or any(closed.get(end) for end in ("lo", "hi")))
+
+    @property
     def shifts(self) -> list[dict]:
         """Shifts of the baseline's parameters, largest first; empty where nothing was added to the model."""
         found = (self.result.get("parameter_shift") or []) if self.enlarged else []

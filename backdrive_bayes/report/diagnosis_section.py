@@ -50,7 +50,7 @@ def _identity(saved):
         ("Gap", tables.gap_text(saved)),
         ("90 % credible set", free(", ".join(label_words(e) for e in saved.credible_set) or "not given")),
     ]
-    if saved.shrink:
+    if saved.added:
         rows.append(("Held out", free(tables.held_out_text(saved))))
     return Facts(rows)
 
@@ -70,15 +70,9 @@ def _details(saved, figures) -> list[Block]:
     parts = (
         ("Which effect", [*tables.probabilities(saved), *tables.effect_parameters(saved)] if saved.effects else []),
         ("Next test", next_test(saved)),
-        ("How far it shrinks", tables.shrink(saved) if _added(saved) else []),
-        ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved)] if _added(saved) else []),
+        ("How far it shrinks", tables.shrink(saved) if saved.added else []),
+        ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved)] if saved.added else []),
         ("", tables.convergence(saved) if saved.effects else []),
         ("Where the gap lies", [*mapped, *pictures("gap-residual")[:1]] if saved.effects else []),
     )
     return [b for name, blocks in parts if blocks for b in (*([Heading(name)] if name else []), *blocks)]
-
-
-def _added(saved):
-    """Whether anything was added to the model: an unknown cause alone changes nothing on held-out data."""
-    closed = saved.shrink.get("closed_fraction") or {}
-    return saved.effects != ["unknown"] or any(closed.get(end) for end in ("lo", "hi"))

@@ -80,7 +80,7 @@ def _rivals(saved):
 
 
 def _closed(saved):
-    if not saved.shrink.get("closed_fraction"):
+    if not saved.added or not saved.shrink.get("closed_fraction"):
         return ""
     share = share_text(saved.shrink["closed_fraction"])
     if saved.effects == ["unknown"]:
