@@ -71,8 +71,8 @@ def fit_unit(unit, options: FitOptions, note=lambda text: None, posterior=None):
 
     ``posterior`` is taken where one was computed already.
     """
-    from backdrive_bayes.gap.averaged import fit_posterior
     from backdrive_bayes.engine.posterior_file import as_saved
+    from backdrive_bayes.gap.averaged import fit_posterior
     from backdrive_bayes.indicators.convergence import examined
     from backdrive_bayes.indicators.draws import IndicatorDraws
     from backdrive_bayes.indicators.least_squares import least_squares_json

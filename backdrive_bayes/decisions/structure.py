@@ -8,6 +8,8 @@ import numpy as np
 
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.mechanics.registry import OPERATOR_PROPERTIES
 
 SMALL = 1e-3
 """A probability that is not worth a word."""
@@ -80,7 +82,7 @@ def _given(evidences, probabilities, diagnosed):
 
 
 def _uncovered(diagnosis, held: set[str]) -> dict[str, float]:
-    """Probabilities of the effects that a diagnosis finds and the models do not hold."""
+    """Probabilities of the effects that a diagnosis answers with and neither the models nor the class itself hold."""
     if diagnosis is None:
         return {}
     try:
@@ -93,9 +95,9 @@ def _uncovered(diagnosis, held: set[str]) -> dict[str, float]:
         raise BadInput("diagnosis.json", wanted, f"{type(error).__name__} {error}") from None
     if not all(np.isfinite(p) and 0 <= p <= 1 + 1e-9 for p in (*found.values(), unlisted)):
         raise BadInput("diagnosis.json", "probabilities between 0 and 1", str(found | {"unlisted": unlisted})[:80])
-    found["unknown"] = max(found.get("unknown", 0.0), unlisted)
-    out = {name: p for name, p in found.items() if name != "none" and not set(name.split("+")) <= held and p > SMALL}
-    if diagnosis.get("inconclusive"):
-        out[NO_VERDICT] = 0.5
-    # What a diagnosis answers with acts, whatever the rounding of its single probabilities.
-    return out | {name: max(0.5, out.get(name, 0.0)) for name in answer if name not in held and name != "none"}
+    covered = {*held, *OPERATOR_PROPERTIES, *BASELINE, "none"}
+    # A fit averages over what may act; what its diagnosis answers with and it does not hold speaks against either decision.
+    out = {name: max(0.5, found.get(name, 0.0)) for name in answer if name not in covered}
+    if unlisted > 0.5:
+        out["unknown"] = max(out.get("unknown", 0.0), unlisted)
+    return out | ({NO_VERDICT: 0.5} if diagnosis.get("inconclusive") else {})

@@ -1,6 +1,6 @@
 """Gaussian algebra of a conditionally linear model: weights, offsets and the noise scale are integrated exactly.
 
-y = X w + noise, w ~ N(0, diag(s²)), noise ~ σ² N(0, C) with known C and a scaled inverse-chi-square prior on σ² of ``noise_dof``
+y = X w + noise, w ~ σ N(0, diag(s²)), noise ~ σ N(0, C) with known C and a scaled inverse-chi-square prior on σ² of ``noise_dof``
 degrees of freedom, a flat offset for each record. X and y are whitened by C and free of the offsets.
 """
 

@@ -68,10 +68,13 @@ class _Independence(Move):
         return self.update(state, emcee.State(new, log_prob=log_prob, blobs=blobs), accepted), accepted
 
 
-def sample(data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, note=lambda text: None) -> Draws:
+def sample(
+    data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, power: float = 1.0, note=lambda text: None
+) -> Draws:
     """Draws of the log scales from their marginal posterior, and of the weights given each.
 
     ``mode`` (scales,) holds the log scales at the mode, fixed ones included; ``names`` are those of the scales.
+    Weights are drawn from the likelihood raised to ``power``; the scales always see all of it.
     """
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
@@ -97,10 +100,10 @@ def sample(data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, n
     flat = log_scale.reshape(-1, mode.size)
     # Walkers that stay where they are share their log scales: one factorisation serves all their draws.
     at, which = np.unique(flat, axis=0, return_inverse=True)
-    weights = np.empty((flat.shape[0], data.x.shape[1]))
+    weights, coarse = np.empty((flat.shape[0], data.x.shape[1])), compressed.coarsened(power)
     for k in range(at.shape[0]):
         own = np.flatnonzero(which == k)
-        weights[own] = draw_weights(compressed, basis, at[k], own.size, rng)
+        weights[own] = draw_weights(coarse, basis, at[k], own.size, rng)
     weights = weights.reshape(*drawn.shape[:2], -1)
     acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
     return Draws(log_scale, weights, density, acceptance, convergence)

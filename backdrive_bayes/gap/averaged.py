@@ -70,10 +70,12 @@ def mixed(drawn: list[tuple[Posterior, float]]) -> Posterior:
     counts = [max(1, int(round(draws * p / total))) for _, p in drawn[1:]]
     counts = [draws - sum(counts), *counts]
     picks = [np.linspace(0, q.shape[1] - 1, n).astype(int) for (q, _), n in zip(drawn, counts, strict=True)]
+    # Interleaved, so that halves of a chain hold the hypotheses alike.
+    order = np.argsort(np.concatenate([(np.arange(n) + 0.5) / n for n in counts]), kind="stable")
     common = [n for n in first.weights if all(n in q.weights for q, _ in drawn)]
 
     def join(part):
-        return np.concatenate([part(q)[:, k] for (q, _), k in zip(drawn, picks, strict=True)], axis=1)
+        return np.concatenate([part(q)[:, k] for (q, _), k in zip(drawn, picks, strict=True)], axis=1)[:, order]
 
     worst = min((q.convergence for q, _ in drawn), key=lambda c: (c.converged, -np.nanmax(c.rhat)))
     return replace(

@@ -40,3 +40,5 @@ UNKNOWN = UNEXPLAINED
 """The process that stands for what no listed effect explains."""
 BENCH = (BENCH_HYSTERESIS,)
 """What every bench has at trace level and no diagnosis can name."""
+OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
+"""Effects that lie inside the class: any fit holds them."""

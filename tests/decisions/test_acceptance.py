@@ -84,11 +84,17 @@ def test_an_effect_that_the_fit_holds_is_no_gap():
     assert result["verdict"] == "accepted" and result["structure"]["unknown_probability"] == 0
 
 
-def test_small_probabilities_of_other_effects_add_to_the_risk():
-    found = diagnosis([], none=0.97, sensor_lag=0.03)
+def test_what_a_diagnosis_does_not_answer_with_is_averaged_over_by_the_fit():
+    found = diagnosis([], none=0.85, sensor_lag=0.05, unknown=0.1)
     result = judge(area(30), e=evidence(diagnosis=found))
-    assert result["verdict"] == "accepted"
-    assert result["specific_consumer_risk"] == pytest.approx(0.03, abs=0.002)
+    assert result["verdict"] == "accepted" and result["structure"]["uncovered"] == {}
+
+
+def test_a_property_of_the_operator_is_held_by_every_fit():
+    found = diagnosis(["interface_slip"], interface_slip=0.9, none=0.1)
+    assert judge(area(30), e=evidence(diagnosis=found))["verdict"] == "accepted"
+    lag = diagnosis(["interface_slip", "sensor_lag"], **{"interface_slip+sensor_lag": 0.9, "none": 0.1})
+    assert judge(area(30), e=evidence(diagnosis=lag))["verdict"] == "inconclusive"
 
 
 def test_a_pair_of_which_the_fit_holds_both_is_no_gap():
