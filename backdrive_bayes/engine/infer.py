@@ -49,7 +49,7 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
         scales = linear.design.scales(levels(linear, hypothesis))
         start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
         mode, solution = find_scales(linear.data, scales, start)
-        drawn = sample(linear.data, scales, mode, linear.design.names, seed, POWER, note)
+        drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWER)
     reduced, names = linear.reduced, linear.design.names
     return Posterior(
         unit_name=reduced.unit.name,

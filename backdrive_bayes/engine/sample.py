@@ -69,7 +69,7 @@ class _Independence(Move):
 
 
 def sample(
-    data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, power: float = 1.0, note=lambda text: None
+    data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, note=lambda text: None, power: float = 1.0
 ) -> Draws:
     """Draws of the log scales from their marginal posterior, and of the weights given each.
 

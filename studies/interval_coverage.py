@@ -1,7 +1,7 @@
 """Do 90 % intervals hold the truth on clean units of virtual benches that share nothing with the class?
 
     python studies/make_bench.py /tmp/contact --bench contact --units 60 --seed 101
-    python studies/coverage.py contact=/tmp/contact ode=/tmp/ode --workers 2
+    python studies/interval_coverage.py contact=/tmp/contact ode=/tmp/ode --workers 2
 
 Each clean unit of a folder made by studies/make_bench.py is fitted as the command `fit` does; the page
 reports/coverage/README.md says how
@@ -78,7 +78,7 @@ def main() -> None:
     lines = [
         "# Coverage of 90 % intervals on clean units",
         "",
-        "Made by `python studies/coverage.py`. Share of intervals that hold the",
+        "Made by `python studies/interval_coverage.py`. Share of intervals that hold the",
     ]
     lines += ["reducer's own loop (median relative half width); records of one unit count as one in the bounds.", ""]
     lines += ["| bench | units | converged | " + " | ".join(TRUTH) + " | 99 % bounds |", "|---" * (len(TRUTH) + 4) + "|"]
