@@ -62,8 +62,12 @@ def run_weigh(args) -> None:
 
 
 def read_benches() -> dict[str, list[dict]]:
-    """Saved rows by bench."""
-    return {p.stem: list(json.loads(p.read_text()).values()) for p in sorted(HOME.glob("*.json"))}
+    """Saved rows by bench; set 1 and foreign-1 are of one."""
+    benches: dict[str, list[dict]] = {}
+    for path in sorted(HOME.glob("*.json")):
+        name = "foreign" if path.stem in ("set-1", "foreign-1") else path.stem
+        benches.setdefault(name, []).extend(json.loads(path.read_text()).values())
+    return benches
 
 
 def answers(row: dict, calibration: Calibration) -> dict[str, float]:
@@ -160,8 +164,8 @@ def write_readme(table, calibration) -> None:
     values = ", ".join(f"{f.name} {getattr(calibration, f.name):.2f}" for f in fields(calibration))
     lines += ["", f"Set on all benches: {values}.", ""]
     lines += [
-        "`foreign` are the labelled units of a bench whose code is not here (set 1 and foreign-1, 104 units); the others are units",
-        "of this project's four benches, made by `studies/make_bench.py --units 60 --seed 101`.",
+        "`foreign` are the labelled units of a bench whose code is not here (set 1 and foreign-1, 104 units); the others are",
+        "units of this project's four benches, made by `studies/make_bench.py --units 60 --seed 101`.",
         "",
     ]
     (HOME / "README.md").write_text("\n".join(lines))
