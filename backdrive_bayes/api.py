@@ -161,7 +161,7 @@ class Comparison:
 
 
 def fit(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, loads=(), load_rate=None, progress=None) -> Fit:
-    """Posterior and indicators of a unit (or of the path of one); ``progress`` is told where it stands.
+    """Posterior and indicators of a unit (or of the path of one); ``progress`` receives lines about the state of the run.
 
     ``loads`` [N·m], arriving at ``load_rate`` [N·m/s] or at every measured rate, are answered under ``indicators["loads"]``.
     """

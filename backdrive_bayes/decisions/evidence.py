@@ -31,7 +31,7 @@ class Draws(Protocol):
         """An indicator of a loop, of all or the kept draws."""
 
     def width_torques(self, amplitude: float) -> np.ndarray:
-        """Torques at which the width of a loop is told."""
+        """Torques at which the width of a loop is given."""
 
     def widths(self, rate: float, amplitude: float) -> np.ndarray:
         """Width of the kept draws' loops there."""

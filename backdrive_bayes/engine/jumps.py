@@ -106,7 +106,7 @@ def _leaps(record, blocks, predicted_rad, noise):
     if value.size < 20:
         return None
     sd = max(1.4826 * float(np.median(np.abs(value - np.median(value)))), 1e-300)
-    # The leap is taken where it is largest in its neighbourhood, as far as leaps are told apart.
+    # The leap is taken where it is largest in its neighbourhood, at the resolution of the differences.
     pieces = value[: value.size // half * half].reshape(-1, half)
     at = np.arange(pieces.shape[0]), np.argmax(np.abs(pieces - np.median(value)), axis=1)
     largest, instants = pieces[at], instant[: pieces.size].reshape(pieces.shape)[at]

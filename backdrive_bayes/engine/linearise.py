@@ -33,13 +33,13 @@ REFINEMENTS = 3
 LEARNINGS = 4
 """How often the jitter is learnt at most: a prediction made with too little of it hides most of it."""
 FREE_PLAY = (-8.0, -4.5)
-"""Log scales of free play from which its mode is sought: hardly any, and as much as there is clearance."""
+"""Log scales of free play from which its mode is searched: hardly any, and as much as there is clearance."""
 STEPS = 14
 TRIAL_STEPS = 2
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque; exponents fifty times as much."""
 WIDE = 2.0
-"""Standard deviation of an effect's log scale while the mode is sought."""
+"""Standard deviation of an effect's log scale while the mode is searched."""
 USUAL_JITTER = Jitter(0.15, 0.002)
 """Of the bench's torque noise, and of the torque scale."""
 JITTER_LOG_SD = 1.5

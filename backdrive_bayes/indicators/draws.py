@@ -104,7 +104,7 @@ class IndicatorDraws:
         return self._once(key, lambda: core_indicators(self.loops(rate, amplitude, kept), torque))[name]
 
     def width_torques(self, amplitude: float) -> np.ndarray:
-        """Torques at which a loop's width is told [N·m], dense around zero."""
+        """Torques at which a loop's width is given [N·m], dense around zero."""
         return amplitude * np.linspace(-1, 1, WIDTH_POINTS) ** 3
 
     def widths(self, rate: float, amplitude: float) -> np.ndarray:

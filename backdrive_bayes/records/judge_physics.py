@@ -23,7 +23,7 @@ def judge_physics(found: dict, columns: dict[str, str]):
     yield from _jumps(found["angle_jumps"])
     yield from _range(found)
     loop = found["measured_loop"]
-    # A frozen channel draws loops of any direction and is told for itself.
+    # A frozen channel draws loops of any direction and has a finding of its own.
     if found["energy_given"] and not any(stands_still(frozen) for frozen in found["frozen"].values()):
         yield Finding(
             "error",

@@ -41,7 +41,7 @@ class EngineReducer:
     reduction_ratio: float = 100.0
 
     def train(self) -> Train:
-        """What the engine is told: bearings and links in normalised units."""
+        """What the engine receives: bearings and links in normalised units."""
         friction, load, compliance = (np.array(w) for w in self.weights)
         first = self.gaps[0] if self.gaps else BODIES // 2
         before = np.arange(BODIES) <= first
