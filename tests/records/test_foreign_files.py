@@ -104,7 +104,7 @@ def test_a_leading_minus_turns_any_channel(unit_folder, sign):
 
 
 def workbook(path, *sheets):
-    openpyxl = pytest.importorskip("openpyxl")
+    openpyxl = pytest.importorskip("openpyxl", reason="Excel files need the extra 'readers'")
     book = openpyxl.Workbook()
     book.remove(book.active)
     for title, lines in sheets:
@@ -191,7 +191,7 @@ def test_matlab_73_structures(tmp_path):
 
 
 def measurement(path, *groups):
-    asammdf = pytest.importorskip("asammdf")
+    asammdf = pytest.importorskip("asammdf", reason="MF4 files need the extra 'mdf'")
     with asammdf.MDF(version="4.10") as file:
         for group in groups:
             file.append([asammdf.Signal(v, t, name=name, unit=unit) for name, unit, t, v in group])
