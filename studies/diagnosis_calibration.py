@@ -28,8 +28,9 @@ from backdrive_bayes.records.unit_folder import read_unit
 HOME = Path(__file__).parents[1] / "reports" / "diagnosis-calibration"
 FLOOR = 1e-3
 """Probability below which a log score counts no further."""
-UNSEEN = """Only the calibration numbers are set on the other benches: thresholds of properties, trace levels, the lowest frequency
-of a wave and the terms themselves were developed with units of all these benches in view, so that no bench here is wholly unseen."""
+UNSEEN = """Only the calibration numbers are set on the other benches: thresholds of properties, trace levels, the
+lowest frequency of a wave and the terms themselves were developed with units of all these benches in view, so that no bench
+here is wholly unseen."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 
 
