@@ -80,17 +80,7 @@ def sample(
     free = np.flatnonzero(scales.free)
     target = _Target(compressed, basis.group, scales, mode, free)
     move = _adapted(target, _Independence(mode[free], _laplace_root(target, mode[free])), seed)
-    samplers = []
-    for chain in range(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(
-            WALKERS, free.size, target, moves=[(move, 0.6), (DEMove(), 0.4)], vectorize=True
-        )
-        random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
-        sampler.random_state = random.get_state()
-        sampler.run_mcmc(move.draw(random, WALKERS), 4, skip_initial_state_check=True)
-        sampler.reset()
-        samplers.append(sampler)
-    convergence = _run(samplers, [names[i] for i in free], target, note)
+    samplers, convergence = _ensembles(target, move, [names[i] for i in free], seed, note)
     drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
     density = np.stack([s.get_log_prob().ravel() for s in samplers])
     drawn, density = drawn[:, _thin(drawn)], density[:, _thin(drawn)]
@@ -107,6 +97,33 @@ def sample(
     weights = weights.reshape(*drawn.shape[:2], -1)
     acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
     return Draws(log_scale, weights, density, acceptance, convergence)
+
+
+def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: int) -> tuple[np.ndarray, Convergence]:
+    """Draws (chains, draws, dimension) of any log density and their convergence.
+
+    ``target`` maps points (points, dimension) to log densities (points,) and counts its ``evaluations``; the first proposals
+    are made about ``centre`` (dimension,) with the Cholesky factor ``root`` of their covariance.
+    """
+    move = _adapted(target, _Independence(centre, root), seed)
+    samplers, convergence = _ensembles(target, move, names, seed, lambda text: None)
+    drawn = np.stack([s.get_chain().reshape(-1, centre.size) for s in samplers])
+    return drawn[:, _thin(drawn)], convergence
+
+
+def _ensembles(target, move, names, seed, note):
+    """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
+    samplers = []
+    for chain in range(ENSEMBLES):
+        sampler = emcee.EnsembleSampler(
+            WALKERS, len(names), target, moves=[(move, 0.6), (DEMove(), 0.4)], vectorize=True
+        )
+        random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
+        sampler.random_state = random.get_state()
+        sampler.run_mcmc(move.draw(random, WALKERS), 4, skip_initial_state_check=True)
+        sampler.reset()
+        samplers.append(sampler)
+    return samplers, _run(samplers, names, target, note)
 
 
 def _run(samplers, names, target, note) -> Convergence:
