@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[1] / "backdrive_bayes"
 PACKAGE = ROOT.name
 ORDER = (
     "errors",
+    "schemas",
     "results",
     "records",
     "mechanics",

@@ -46,9 +46,10 @@ def run(args) -> int:
 
 def read_template(folder: Path):
     """A company's template for the report; BadInput says which file or key of the folder cannot be used."""
-    from backdrive_bayes.records.toml_file import read_toml
     from backdrive_bayes.report.company import FILE_NAME, company_template
     from backdrive_bayes.report.logo import NAMES, read_logo
+    from backdrive_bayes.schemas.template_file import TemplateFile
+    from backdrive_bayes.schemas.toml_file import read_typed
 
     folder = Path(folder)
     if not folder.is_dir():
@@ -56,4 +57,4 @@ def read_template(folder: Path):
     logo, path = read_logo(folder), folder / FILE_NAME
     if not path.exists() and logo is None:
         raise BadInput(folder, f"a template folder with {', '.join([FILE_NAME, *NAMES])}", "none of them")
-    return company_template(path, read_toml(path, "a template file") if path.exists() else {}, logo)
+    return company_template(read_typed(path, TemplateFile, "a template file") if path.exists() else TemplateFile(), logo)

@@ -13,15 +13,11 @@ from backdrive_bayes.decisions.expression import Expression, Wrong
 from backdrive_bayes.decisions.loops import SAME_RATE, NotAvailable, same
 from backdrive_bayes.decisions.quantities import Quantities
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.records.toml_file import read_toml
+from backdrive_bayes.schemas.claims_file import ClaimsFile, ClaimTable
+from backdrive_bayes.schemas.toml_file import read_typed
 
-SCHEMA = "backdrive-bayes/claims/1"
 PAPER = "paper"
 HOLDS, FAILS = 0.95, 0.05
-_KEYS = ("id", "text", "holds", "probability", "every", "along", "rate", "amplitude", "from", "to", "note")
-_ALONG = ("rate", "amplitude", "torque")
-_MOST = 500
-LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,18 +51,10 @@ class Claims:
 
 def read_claims(path: Path | str) -> Claims:
     """Read a claims file, or the published claims under the name ``paper``; BadInput names claim and key."""
-    path = files("backdrive_bayes.decisions").joinpath("paper_claims.toml") if str(path) == PAPER else Path(path)
-    table = read_toml(path, f"a claims file or '{PAPER}'")
-    if table.get("schema") != SCHEMA:
-        raise BadInput(f"{path}, key schema", f"'{SCHEMA}'", repr(table.get("schema"))[:60])
-    letters = table.get("units", list(LETTERS))
-    if not isinstance(letters, list) or not all(isinstance(u, str) and u.isidentifier() for u in letters) or not letters:
-        raise BadInput(f"{path}, key units", 'letters for the units in their order, as in ["A", "B"]', repr(letters)[:60])
-    entries = table.get("claim")
-    if not isinstance(entries, list) or not entries or len(entries) > _MOST:
-        raise BadInput(f"{path}, key claim", f"one to {_MOST} [[claim]] tables", "none" if not entries else "something else")
-    claims = tuple(_claim(path, e, i, letters) for i, e in enumerate(entries, 1))
-    return Claims(claims, tuple(letters), str(table.get("source", "")))
+    path = Path(str(files("backdrive_bayes.decisions") / "paper_claims.toml")) if str(path) == PAPER else Path(path)
+    file = read_typed(path, ClaimsFile, f"a claims file or '{PAPER}'")
+    claims = tuple(_claim(f"{path}, claim {i}", table, i, file.units) for i, table in enumerate(file.claim, 1))
+    return Claims(claims, tuple(file.units), file.source)
 
 
 def answer(evidences, claims: Claims, seed: int = 0) -> dict:
@@ -171,52 +159,29 @@ def _asked(claim: Claim) -> str:
     return ", ".join([claim.holds.text, *(w for w in where if w)])
 
 
-def _claim(path, entry, number, letters) -> Claim:
-    where = f"{path}, claim {number}"
-    if not isinstance(entry, dict):
-        raise BadInput(where, "a table", repr(entry)[:60])
-    for key in entry:
-        if key not in _KEYS:
-            raise BadInput(f"{where}, key {key}", f"one of {', '.join(_KEYS)}", f"'{key}'")
-    if ("holds" in entry) == ("probability" in entry):
-        raise BadInput(where, "either holds or probability", "both" if "holds" in entry else "neither")
-    key = "holds" if "holds" in entry else "probability"
+def _claim(where: str, table: ClaimTable, number: int, letters: list[str]) -> Claim:
+    key, text = table.asked
     try:
-        expression = Expression.parse(entry[key], letters)
+        expression = Expression.parse(text, letters)
     except Wrong as why:
         raise BadInput(f"{where}, key {key}", *_split(str(why))) from None
     if not expression.units:
         raise BadInput(f"{where}, key {key}", f"a quantity of a unit ({', '.join(letters[:3])} …)", f"'{expression.text}'")
     return Claim(
-        str(entry.get("id", number)),
-        str(entry.get("text", expression.text)),
-        expression,
-        key == "probability",
-        _choice(where, entry, "every", ("rate",)),
-        _choice(where, entry, "along", _ALONG),
-        *(_number_key(where, entry, k, None) for k in ("rate", "amplitude")),
-        _number_key(where, entry, "from", 0.0),
-        _number_key(where, entry, "to", np.inf),
-        str(entry.get("note", "")),
+        number=str(number if table.id is None else table.id),
+        text=expression.text if table.text is None else table.text,
+        holds=expression,
+        is_probability=key == "probability",
+        every=table.every,
+        along=table.along,
+        rate=table.rate,
+        amplitude=table.amplitude,
+        low=table.low or 0.0,
+        high=table.high or np.inf,
+        note=table.note,
     )
 
 
 def _split(text):
     expected, _, found = text.removeprefix("expected ").partition(", found ")
     return expected, found or "something else"
-
-
-def _choice(where, entry, key, allowed):
-    value = entry.get(key)
-    if value is not None and value not in allowed:
-        raise BadInput(f"{where}, key {key}", f"one of {', '.join(allowed)}", repr(value)[:60])
-    return value
-
-
-def _number_key(where, entry, key, default):
-    value = entry.get(key, default)
-    if value is default:
-        return value
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value <= 0:
-        raise BadInput(f"{where}, key {key}", "a positive number", repr(value)[:60])
-    return float(value)

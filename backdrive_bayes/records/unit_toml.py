@@ -1,21 +1,16 @@
-"""The unit file of a unit folder: read and judged key by key."""
+"""The unit file of a unit folder as reading uses it."""
 
 from __future__ import annotations
 
-import datetime
-import difflib
-import math
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.records.toml_file import read_toml
+from backdrive_bayes.schemas.toml_file import read_toml
+from backdrive_bayes.schemas.typed import nearest, typed
+from backdrive_bayes.schemas.unit_file import RecordTable, UnitFile
 
-SCHEMA = "backdrive-bayes/unit/1"
 FILE_NAME = "unit.toml"
-_UNIT_KEYS = ("schema", "name", "rated_torque_Nm", "reduction_ratio", "record")
-_RECORD_KEYS = ("file", "loading_rate_Nm_per_s", "amplitude_Nm", "columns")
-_COLUMN_KEYS = ("time", "torque", "angle")
 
 
 @dataclass(frozen=True)
@@ -45,48 +40,27 @@ def read_unit_toml(folder: Path) -> UnitEntry:
     """Read ``unit.toml`` in ``folder``; BadInput names the key, what was expected and what was found."""
     path = folder / FILE_NAME
     table = read_toml(path, "a unit file", "a folder without one" if folder.is_dir() else "nothing there")
-    schema = _text(path, table, "schema")
-    if schema != SCHEMA:
-        raise BadInput(f"{path}, key schema", f"'{SCHEMA}'", f"'{schema}'")
-    identity, notes = _extras(path, table)
-    return UnitEntry(
-        name=_text(path, table, "name"),
-        rated_torque_nm=_positive(path, table, "rated_torque_Nm", required=True),
-        records=_records(path, folder, table),
-        reduction_ratio=_positive(path, table, "reduction_ratio"),
-        identity=identity,
-        notes=notes,
-    )
+    _refuse_misspelt(str(path), table, UnitFile.__struct_fields__)
+    file = typed(table, UnitFile, path)
+    for number, entry in enumerate(table["record"], 1):
+        _refuse_misspelt(f"{path}, record {number}", entry, RecordTable.__struct_fields__)
+    identity, notes = _extras(table)
+    records = tuple(_record(f"{path}, record {i}", folder, entry) for i, entry in enumerate(file.record, 1))
+    _refuse_twice(path, records)
+    return UnitEntry(file.name, file.rated_torque_Nm, records, file.reduction_ratio, identity, notes)
 
 
-def _records(path: Path, folder: Path, table: dict) -> tuple[RecordEntry, ...]:
-    entries = table.get("record")
-    if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        raise BadInput(
-            f"{path}, key record", "at least one [[record]] table", _shown(entries, table, "record")
-        )
-    records = tuple(_record(path, folder, entry, number) for number, entry in enumerate(entries, start=1))
+def _refuse_twice(path: Path, records: tuple[RecordEntry, ...]) -> None:
     seen: dict[Path, int] = {}
     for number, record in enumerate(records, start=1):
         first = seen.setdefault(record.path.resolve(), number)
         if first != number:
-            raise BadInput(
-                f"{path}, record {number}, key file", "each file once", f"'{record.name}' of record {first}"
-            )
-    return records
+            raise BadInput(f"{path}, record {number}, key file", "each file once", f"'{record.name}' of record {first}")
 
 
-def _record(path: Path, folder: Path, entry: dict, number: int) -> RecordEntry:
-    where = f"{path}, record {number}"
-    _refuse_misspelt(where, entry, _RECORD_KEYS)
-    name = _text(where, entry, "file")
-    return RecordEntry(
-        path=_inside(where, folder, name),
-        name=name,
-        columns=_columns(where, entry.get("columns", {})),
-        loading_rate_nm_per_s=_positive(where, entry, "loading_rate_Nm_per_s"),
-        amplitude_nm=_positive(where, entry, "amplitude_Nm"),
-    )
+def _record(where: str, folder: Path, entry: RecordTable) -> RecordEntry:
+    path = _inside(where, folder, entry.file)
+    return RecordEntry(path, entry.file, entry.columns.given(), entry.loading_rate_Nm_per_s, entry.amplitude_Nm)
 
 
 def _inside(where: str, folder: Path, name: str) -> Path:
@@ -109,63 +83,15 @@ def _inside(where: str, folder: Path, name: str) -> Path:
     return folder / relative
 
 
-def _columns(where: str, columns) -> dict[str, str]:
-    if not isinstance(columns, dict):
-        raise BadInput(f"{where}, key columns", "a table of time, torque and angle", f"{columns!r}")
-    for key in columns:
-        if key not in _COLUMN_KEYS:
-            raise BadInput(
-                f"{where}, key columns.{key}",
-                f"one of {', '.join(_COLUMN_KEYS)}",
-                f"'{key}'{_nearest(key, _COLUMN_KEYS)}",
-            )
-    return {key: _text(f"{where}, columns", columns, key) for key in columns}
-
-
-def _extras(path: Path, table: dict) -> tuple[dict[str, str], tuple[str, ...]]:
+def _extras(table: dict) -> tuple[dict[str, str], tuple[str, ...]]:
     """Free text of the unit file, and notes on keys that mean nothing here."""
-    _refuse_misspelt(str(path), table, _UNIT_KEYS)
-    identity, notes = {}, []
-    for key, value in table.items():
-        if key in _UNIT_KEYS:
-            continue
-        if isinstance(value, str | int | float | datetime.date | datetime.time) and not isinstance(
-            value, bool
-        ):
-            identity[key] = str(value)
-        else:
-            notes.append(f"key '{key}' of {FILE_NAME} is not text and was left out")
-    return identity, tuple(notes)
+    extras = {key: value for key, value in table.items() if key not in UnitFile.__struct_fields__}
+    told = {key for key, value in extras.items() if isinstance(value, str | int | float) and not isinstance(value, bool)}
+    notes = tuple(f"key '{key}' of {FILE_NAME} is not text and was left out" for key in extras if key not in told)
+    return {key: str(value) for key, value in extras.items() if key in told}, notes
 
 
 def _refuse_misspelt(where: str, table: dict, known: tuple[str, ...]) -> None:
     for key in table:
-        if key not in known and (near := _nearest(key, [name for name in known if name not in table])):
+        if key not in known and (near := nearest(key, [name for name in known if name not in table], 0.8)):
             raise BadInput(f"{where}, key {key}", f"one of {', '.join(known)}", f"'{key}'{near}")
-
-
-def _nearest(key: str, known) -> str:
-    near = [name for name in known if name.casefold() == key.casefold()]
-    near = near or difflib.get_close_matches(key, known, n=1, cutoff=0.8)
-    return f" (did you mean {near[0]}?)" if near else ""
-
-
-def _text(where, table: dict, key: str) -> str:
-    value = table.get(key)
-    if not isinstance(value, str) or not value.strip():
-        raise BadInput(f"{where}, key {key}", "text", _shown(value, table, key))
-    return value
-
-
-def _positive(where, table: dict, key: str, required: bool = False) -> float | None:
-    if key not in table and not required:
-        return None
-    value = table.get(key)
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not 0.0 < value < 1e300 or not math.isfinite(value):
-        raise BadInput(f"{where}, key {key}", "a positive number", _shown(value, table, key))
-    return float(value)
-
-
-def _shown(value, table: dict, key: str) -> str:
-    return repr(value)[:60] if key in table else "no such key"

@@ -1,21 +1,31 @@
-"""Text files in TOML that a user writes: opened and judged in one place."""
+"""Text files in TOML that a user writes: opened, bounded and typed in one place."""
 
 from __future__ import annotations
 
+import datetime
 import tomllib
 from pathlib import Path
+from typing import Any, TypeVar
 
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.schemas.typed import typed
 
 MAX_BYTES = 1_000_000
 MAX_ENTRIES = 1000
 """Of one list or table: no unit has so many records, no drawing so many limits."""
 MAX_DEPTH = 40
 _LARGEST_INTEGER = 10**300
+_DATES = (datetime.date, datetime.time)
+T = TypeVar("T")
 
 
-def read_toml(path: Path, what: str, missing: str = "nothing there") -> dict:
-    """The table of a TOML file; ``what`` names the file expected, ``missing`` what is found where there is none.
+def read_typed(path: Path, shape: type[T], what: str, missing: str = "nothing there") -> T:
+    """A TOML file as an object of ``shape``; BadInput names the key, what was expected and what was found."""
+    return typed(read_toml(path, what, missing), shape, path)
+
+
+def read_toml(path: Path, what: str, missing: str = "nothing there") -> dict[str, Any]:
+    """The table of a TOML file, dates as text; ``what`` names the file expected, ``missing`` what is found where there is none.
 
     Raises BadInput where it is absent, larger than ``MAX_BYTES``, not UTF-8 or not TOML, and where it holds integers beyond
     a float's range, lists longer than ``MAX_ENTRIES`` or tables nested beyond ``MAX_DEPTH``.
@@ -36,7 +46,7 @@ def read_toml(path: Path, what: str, missing: str = "nothing there") -> dict:
     except (ValueError, RecursionError) as error:
         raise BadInput(path, "valid TOML", str(error)[:200]) from error
     _refuse_absurd(path, table)
-    return table
+    return _dates_as_text(table)
 
 
 def _refuse_absurd(path: Path, table: dict) -> None:
@@ -58,3 +68,11 @@ def _refuse_absurd(path: Path, table: dict) -> None:
 def _refuse_many(path: Path, where: str, values) -> None:
     if len(values) > MAX_ENTRIES:
         raise BadInput(f"{path}, {where}", f"at most {MAX_ENTRIES} entries", f"{len(values)}")
+
+
+def _dates_as_text(value):
+    if isinstance(value, dict):
+        return {key: _dates_as_text(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_dates_as_text(inner) for inner in value]
+    return str(value) if isinstance(value, _DATES) else value
