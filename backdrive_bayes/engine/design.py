@@ -9,7 +9,7 @@ import numpy as np
 
 from backdrive_bayes.engine.marginal import Scales
 from backdrive_bayes.engine.reduced import Reduced
-from backdrive_bayes.mechanics.effect import Distortion, Effect, FlankEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import Distortion, Effect, FlankEffect, PathEffect, SpreadEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.history import History, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
@@ -119,6 +119,8 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
             rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
             columns = (reducer.flank_columns(h, weights, distortion.exponents, rate) for h, rate in rates)
             groups.append(Group(effect.name, tuple(columns)))
+        if isinstance(effect, SpreadEffect):
+            groups.append(Group(effect.name, _spread(reduced, reducer, distortion, weights, base)))
         if effect is BENCH_HYSTERESIS:
             late = next(g for g in groups if g.name == "sensor_lag")
             # A lag moves the torque by rate times lag, friction of the bench by the same amount at every rate.
@@ -129,6 +131,22 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
         there = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
         groups.append(Group(effect.name, tuple(((a - b) / effect.step)[:, None] for a, b in zip(there, base, strict=True))))
     return tuple(groups)
+
+
+DELAYS, SHARES = np.polynomial.laguerre.laggauss(3)
+"""Delays, in shares of their mean, that together make a first-order lag (Gauss-Laguerre nodes)."""
+
+
+def _spread(reduced, reducer, distortion, weights, base):
+    """Prediction behind a first-order lag less that behind a pure delay of the same mean; nothing for a lag below the noise."""
+    if abs(distortion.lag_s) * reduced.context.rate.max() < 0.5 * reduced.context.torque_noise:
+        return tuple(np.zeros((b.size, 1)) for b in base)
+    found = [-b for b in base]
+    for delay, share in zip(DELAYS, SHARES, strict=True):
+        moved = replace(distortion, lag_s=delay * distortion.lag_s)
+        late = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
+        found = [f + share * a for f, a in zip(found, late, strict=True)]
+    return tuple(f[:, None] for f in found)
 
 
 def told(reduced: Reduced, effect: TangentEffect) -> bool:

@@ -84,6 +84,11 @@ class FlankEffect(Effect):
 
 
 @dataclass(frozen=True)
+class SpreadEffect(Effect):
+    """A late channel that smooths: the prediction behind a first-order lag less that behind a pure delay of the same mean."""
+
+
+@dataclass(frozen=True)
 class Distortion:
     """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
 

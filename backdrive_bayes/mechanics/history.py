@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from backdrive_bayes.records.reduction import Blocks
@@ -67,3 +68,14 @@ def through(time_s, torque_nm, torque_scale_nm: float) -> History:
     z, count = np.asarray(torque_nm, float) / torque_scale_nm, len(torque_nm) - 1
     time = np.asarray(time_s, float)
     return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count)
+
+
+@numba.njit(cache=True, nogil=True)
+def played(first, z1, threshold):
+    """Output of a play operator at the first torque and at every segment's end, (segments + 1,)."""
+    out = np.empty(z1.size + 1)
+    out[0] = x = first
+    for i in range(z1.size):
+        x = min(max(x, z1[i] - threshold), z1[i] + threshold)
+        out[i + 1] = x
+    return out

@@ -3,12 +3,15 @@
 import numpy as np
 
 from backdrive_bayes.mechanics.effect import FlankEffect, PathEffect
+from backdrive_bayes.mechanics.history import played
 
-NODES = np.array([0.0, 0.08, 0.25, 0.5, 0.75, 1.2])
+NODES = np.array([0.0, 0.01, 0.03, 0.08, 0.16, 0.28, 0.45, 0.65, 0.85, 1.2])
+BEHIND = (0.0, 0.02, 0.08, 0.3)
+"""Thresholds of friction through which the even part may see the torque."""
 
 
 class AsymmetricStiffness(PathEffect):
-    """An angle that is even in the torque, smooth in |z|."""
+    """An angle that is even in the torque, or in the torque behind friction, smooth in the root of its size."""
 
     def trace(self, context):
         """A third of the angle noise over the whole range."""
@@ -19,10 +22,16 @@ class AsymmetricStiffness(PathEffect):
         return 0.02
 
     def responses(self, history, record, context):
-        """Even integrals of pieces of |z| under a smooth prior."""
-        centre = 0.5 * (NODES[1:] + NODES[:-1])
-        mixing = np.linalg.cholesky(np.exp(-np.abs(centre[:, None] - centre) / 0.4))
-        return tuple(np.clip(np.abs(z)[:, None] - NODES[:-1], 0.0, np.diff(NODES)) @ mixing for z in (history.z0, history.z1))
+        """Even integrals of pieces of |z| under a smooth prior, for every threshold; behind friction at half the size."""
+        root = np.sqrt(0.5 * (NODES[1:] + NODES[:-1]))
+        mixing = np.linalg.cholesky(np.exp(-np.abs(root[:, None] - root) / 0.5))
+        begin, end = [], []
+        for threshold in BEHIND:
+            z = played(history.z0[0], history.z1, threshold)
+            for found, ends in ((begin, z[:-1]), (end, z[1:])):
+                pieces = np.clip(np.abs(ends)[:, None] - NODES[:-1], 0.0, np.diff(NODES)) @ mixing
+                found.append(pieces * (0.5 if threshold else 1.0))
+        return np.hstack(begin), np.hstack(end)
 
 
 ASYMMETRIC_STIFFNESS = AsymmetricStiffness(

@@ -1,6 +1,6 @@
 """The angle channel is late against the torque channel."""
 
-from backdrive_bayes.mechanics.effect import TangentEffect
+from backdrive_bayes.mechanics.effect import SpreadEffect, TangentEffect
 
 
 class SensorLag(TangentEffect):
@@ -24,4 +24,21 @@ SENSOR_LAG = SensorLag(
     False,
     False,
     "lag_s",
+)
+
+
+class LagSpread(SpreadEffect):
+    """How much of the lag is a first-order one: 0 for a pure delay, 1 where all of it smooths."""
+
+    def trace(self, context):
+        """A small part."""
+        return 0.1
+
+    def present(self, context):
+        """Half of it."""
+        return 0.5
+
+
+LAG_SPREAD = LagSpread(
+    "lag_spread", "rate independence", "steps are rounded", "step response of a first-order lag", "1", False, False
 )

@@ -4,6 +4,7 @@ import numba
 import numpy as np
 
 from backdrive_bayes.mechanics.effect import PathEffect
+from backdrive_bayes.mechanics.history import played
 
 TIMES = 8
 FRICTION = 0.04
@@ -29,7 +30,7 @@ class ViscoelasticCreep(PathEffect):
         """Delayed less instantaneous response at the segments' ends."""
         times = self.times_s(context)
         span = np.maximum(history.t1 - history.t0, 1e-12)
-        held = _play(history.z0[0], history.z1, FRICTION)
+        held = played(history.z0[0], history.z1, FRICTION)
         begin, end = [], []
         for (z0, z1), chosen in (((history.z0, history.z1), times), ((held[:-1], held[1:]), times[::2])):
             for time in chosen:
@@ -60,17 +61,6 @@ def _delayed(z0, z1, span, time):
         x = z1[i] - slope * time + (x - z0[i] + slope * time) * np.exp(-span[i] / time)
         end[i] = x
     return begin, end
-
-
-@numba.njit(cache=True, nogil=True)
-def _play(first, z1, threshold):
-    """Output of a play operator at the first torque and at every segment's end, (segments + 1,)."""
-    out = np.empty(z1.size + 1)
-    out[0] = x = first
-    for i in range(z1.size):
-        x = min(max(x, z1[i] - threshold), z1[i] + threshold)
-        out[i + 1] = x
-    return out
 
 
 VISCOELASTIC_CREEP = ViscoelasticCreep(
