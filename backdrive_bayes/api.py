@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
-from backdrive_bayes.commands.output import probability_text, write_folder, write_json
+from backdrive_bayes.commands.output import write_folder, write_json
 from backdrive_bayes.commands.results import FitOptions, diagnose_unit, draw_figures, fit_unit, is_result, keep_fit, stamped_by
 from backdrive_bayes.decisions.acceptance import assess
 from backdrive_bayes.decisions.claims import read_claims
@@ -16,6 +16,7 @@ from backdrive_bayes.decisions.comparison import compare as compare_evidence
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.limits import Limits, read_limits
 from backdrive_bayes.indicators.loads import loads_json
+from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.records import record
 from backdrive_bayes.records.unit_folder import read_unit
 
@@ -155,7 +156,7 @@ class Comparison:
             ratio = f"{pair['first']} / {pair['second']}"
             out += _table(["rate [N·m/s]", "amplitude [N·m]", "indicator", ratio, "P(first larger)", "verdict"], rows)
         if self.claims:
-            rows = [[c["id"], c["claim"], _probability(c["probability"]), c["verdict"]] for c in self.claims]
+            rows = [[c["id"], c["claim"], probability_text(c["probability"]), c["verdict"]] for c in self.claims]
             out += _table(["no.", "claim", "probability", "verdict"], rows)
         return out
 
@@ -241,10 +242,6 @@ def _table(names, rows):
     head = "".join(f"<th>{html.escape(str(n))}</th>" for n in names)
     body = "".join("<tr>" + "".join(f"<td>{html.escape(str(c))}</td>" for c in row) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def _probability(probability):
-    return "–" if probability is None else probability_text(probability)
 
 
 def _interval(entry):

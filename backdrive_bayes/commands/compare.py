@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from backdrive_bayes.commands.door import FORCED, collected, repeat_findings
-from backdrive_bayes.commands.output import default_out, probability_text, require_out, say, write_folder, write_json
+from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
     FitOptions,
@@ -20,6 +20,7 @@ from backdrive_bayes.commands.results import (
     stamped_by,
 )
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.number_text import probability_text
 
 HELP = "differences of units with intervals, and the probability of claims about them"
 

@@ -37,13 +37,6 @@ def complain(error: Exception | str) -> None:
     _write(sys.stderr, "backdrive-bayes: " + (line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…"))
 
 
-def probability_text(probability: float) -> str:
-    """A probability with three digits, never rounded to certainty."""
-    if probability > 0.999:
-        return "above 0.999"
-    return "below 0.001" if probability < 0.001 else f"{probability:.3g}"
-
-
 def default_out(unit_name: str, verb: str) -> Path:
     """Folder ``<unit name>-<verb>`` in the working directory, with dashes for what no file name may hold."""
     safe = re.sub(r"[^\w.+-]+", "-", unit_name).strip(".-") or "unit"

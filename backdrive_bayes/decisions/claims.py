@@ -10,9 +10,10 @@ import numpy as np
 
 from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
 from backdrive_bayes.decisions.expression import Expression, Wrong
-from backdrive_bayes.decisions.loops import SAME_RATE, NotAvailable, same
+from backdrive_bayes.decisions.loops import NotAvailable
 from backdrive_bayes.decisions.quantities import Quantities
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.indicators.same_loop import same_rate
 from backdrive_bayes.schemas.claims_file import ClaimsFile, ClaimTable
 from backdrive_bayes.schemas.toml_file import read_typed
 
@@ -128,7 +129,7 @@ def _number(claim, part, look_up, along, where):
 def _rates(claim, units) -> list[float]:
     """Rates that all units of the claim have in common."""
     own = [units[u] for u in sorted(claim.holds.units)] or list(units.values())[:1]
-    common = [r for r in own[0].rates if all(any(same(s, r, SAME_RATE) for s in e.rates) for e in own[1:])]
+    common = [r for r in own[0].rates if all(any(same_rate(s, r) for s in e.rates) for e in own[1:])]
     if not common:
         raise NotAvailable("the units have no rate in common, and rates cannot be predicted")
     return common

@@ -10,9 +10,10 @@ import numpy as np
 from backdrive_bayes.decisions.claims import Claims, answer
 from backdrive_bayes.decisions.conformance import share
 from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
-from backdrive_bayes.decisions.loops import SAME_AMPLITUDE, SAME_RATE, Loop, NotAvailable, same
+from backdrive_bayes.decisions.loops import Loop, NotAvailable
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
+from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 from backdrive_bayes.results import COMPARISON
 
 ROPE = 0.05
@@ -88,7 +89,7 @@ def match(a: Evidence, b: Evidence) -> tuple[list[Matched], list[dict]]:
 
 def _alike(one: Matched, other: Matched) -> bool:
     a, b = one.first, other.first
-    return same(a.rate, b.rate, SAME_RATE) and same(a.amplitude, b.amplitude, SAME_AMPLITUDE)
+    return same_rate(a.rate, b.rate) and same_amplitude(a.amplitude, b.amplitude)
 
 
 def _pair(i, j, names, evidences, rope, level, rng) -> dict:
@@ -180,7 +181,7 @@ def _overlays(evidences, names) -> list[dict]:
 
 def _near(overlay, loop) -> bool:
     rate, amplitude = overlay["loading_rate_Nm_per_s"], overlay["amplitude_Nm"]
-    return same(rate, loop.rate, SAME_RATE) and same(amplitude, loop.amplitude, SAME_AMPLITUDE)
+    return same_rate(rate, loop.rate) and same_amplitude(amplitude, loop.amplitude)
 
 
 def _mechanism(evidence: Evidence, name: str, level: float) -> dict:

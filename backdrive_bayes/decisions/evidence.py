@@ -9,12 +9,13 @@ from typing import Protocol
 
 import numpy as np
 
-from backdrive_bayes.decisions.loops import SAME_AMPLITUDE, Loop, NotAvailable, find_loop, largest_loops, measured_loops, same
+from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops, measured_loops
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.posterior_file import as_saved
 from backdrive_bayes.engine.posterior_read import read_posterior
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import IndicatorDraws
+from backdrive_bayes.indicators.same_loop import same_amplitude
 from backdrive_bayes.results import DIAGNOSIS, INDICATORS, read_result
 
 
@@ -43,7 +44,7 @@ class Draws(Protocol):
 def same_lost_motion(evidences) -> None:
     """Raise NotAvailable where the units' lost motions were taken at different torques and must not be compared."""
     taken = [e.about["k"] * e.rated_torque for e in evidences]
-    if any(not same(taken[0], t, SAME_AMPLITUDE) for t in taken[1:]):
+    if any(not same_amplitude(taken[0], t) for t in taken[1:]):
         shown = " and ".join(f"±{t:.3g} N·m" for t in taken)
         raise NotAvailable(f"lost motion was taken at {shown}: give the same k·T_r")
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
+
 SMALLEST = 0.05
 """Smallest amplitude that is predicted, as a share of the measured one."""
-SAME_RATE = 0.1
-"""Relative difference up to which two loading rates are the same."""
-SAME_AMPLITUDE = 0.02
-"""Relative difference up to which two amplitudes are the same."""
+
 
 
 class NotAvailable(Exception):
@@ -50,19 +49,14 @@ def measured_loops(rates, amplitudes) -> tuple[Loop, ...]:
 
 
 def _alike(rates, amplitudes, i, j):
-    return same(rates[i], rates[j], SAME_RATE) and same(amplitudes[i], amplitudes[j], SAME_AMPLITUDE)
-
-
-def same(a: float, b: float, tolerance: float) -> bool:
-    """Whether two positive numbers agree to a relative tolerance."""
-    return abs(a / b - 1) <= tolerance
+    return same_rate(rates[i], rates[j]) and same_amplitude(amplitudes[i], amplitudes[j])
 
 
 def largest_loops(measured) -> list[Loop]:
     """The loop of largest amplitude at every rate."""
     best: list[Loop] = []
     for loop in measured:
-        alike = [i for i, b in enumerate(best) if same(loop.rate, b.rate, SAME_RATE)]
+        alike = [i for i, b in enumerate(best) if same_rate(loop.rate, b.rate)]
         if not alike:
             best.append(loop)
         elif loop.amplitude > best[alike[0]].amplitude:
@@ -75,14 +69,14 @@ def find_loop(measured, rate: float, amplitude: float | None = None) -> Loop:
 
     Raises NotAvailable for a rate that was not measured, and for an amplitude beyond the measured one or far below it.
     """
-    at_rate = [x for x in measured if same(x.rate, rate, SAME_RATE)]
+    at_rate = [x for x in measured if same_rate(x.rate, rate)]
     if not at_rate:
         shown = ", ".join(f"{x.rate:.3g}" for x in largest_loops(measured))
         raise NotAvailable(f"rate {rate:.3g} N·m/s was not measured (only {shown} N·m/s) and rates cannot be predicted")
     top = max(at_rate, key=lambda x: x.amplitude)
     if amplitude is None:
         return top
-    exact = [x for x in at_rate if same(x.amplitude, amplitude, SAME_AMPLITUDE)]
+    exact = [x for x in at_rate if same_amplitude(x.amplitude, amplitude)]
     if exact:
         return min(exact, key=lambda x: abs(x.amplitude - amplitude))
     if amplitude > top.amplitude:

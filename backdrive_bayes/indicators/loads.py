@@ -9,9 +9,8 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.indicators import back_drive
 from backdrive_bayes.indicators.intervals import LEVEL, interval
 from backdrive_bayes.indicators.loop import Loops, loop_grid, settled_loops
+from backdrive_bayes.indicators.same_loop import SAME_AMPLITUDE, same_rate
 
-SAME_RATE, SAME_AMPLITUDE = 0.1, 0.01
-"""Relative differences up to which two loading rates, and a load and an amplitude, are the same."""
 BEYOND = 0.15
 """Standard deviation of the log error of what is turned and absorbed beyond the largest measured torque (by convention)."""
 BEYOND_RATES = 0.07
@@ -49,7 +48,7 @@ def largest_by_rate(posterior: Posterior) -> dict[float, int]:
     rates, sizes = posterior.records.rate_nm_per_s, posterior.records.amplitude_nm
     best: dict[float, int] = {}
     for record in map(int, np.argsort(rates, kind="stable")):
-        rate = next((r for r in best if _same(r, rates[record])), float(rates[record]))
+        rate = next((r for r in best if same_rate(r, rates[record])), float(rates[record]))
         if rate not in best or sizes[record] > sizes[best[rate]] * (1 + SAME_AMPLITUDE):
             best[rate] = record
     return best
@@ -95,11 +94,7 @@ def _last_slope(loops: Loops):
 def _beside(largest, rate):
     """Records of the measured rate, or of the rates on either side of one that was not measured; and which it is."""
     for measured, record in largest.items():
-        if _same(measured, rate):
+        if same_rate(measured, rate):
             return [record], True
     below, above = [r for r in largest if r < rate], [r for r in largest if r > rate]
     return [largest[r] for r in (*below[-1:], *above[:1])], False
-
-
-def _same(a, b):
-    return abs(a / b - 1) <= SAME_RATE

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, verdict_figures
 from backdrive_bayes.figures.style import display_unit, indicator_words, words
+from backdrive_bayes.number_text import interval_text, level_text, like_interval, probability_text, significant
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.findings import findings_blocks, warned
-from backdrive_bayes.report.numbers import interval_text, level_text, like_interval, probability_text, significant
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import digests, free
 from backdrive_bayes.results import VERDICT, read_result
@@ -61,17 +61,24 @@ def chapter(folder: Path) -> Chapter:
 
 
 def _outcome(verdict):
+    outcome = verdict["outcome"]
     examined = "" if verdict["structure"]["diagnosed"] else ", structure not examined"
     kept = probability_text(verdict["conformance_probability"])
-    return f"{verdict['verdict'].upper()}; all limits kept with probability {kept}{examined}"
+    return f"{outcome['word'].upper()}{examined}; all limits kept with probability {kept}"
 
 
 def _banner(verdict):
-    reason = verdict["reason"][:1].upper() + verdict["reason"][1:].rstrip(".")
-    text = f"{sentence(reason, 400)}."
+    outcome = verdict["outcome"]
+    text = " ".join(f"{sentence(told[:1].upper() + told[1:].rstrip('.'), 400)}." for told in _told(outcome))
     if verdict["next"]:
         text += f" Next: {sentence(verdict['next']['do'], 500)}"
-    return Banner(_TONES[verdict["verdict"]], verdict["verdict"].upper(), text)
+    # Green is for a verdict that stands as it is.
+    tone = "caution" if outcome["caveat"] and outcome["word"] == "accepted" else _TONES[outcome["word"]]
+    return Banner(tone, outcome["word"].upper(), text)
+
+
+def _told(outcome):
+    return [text for text in (outcome["caveat"], outcome["reason"]) if text]
 
 
 def _identity(verdict):

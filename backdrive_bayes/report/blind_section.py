@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.figures.blind import CAPTIONS, blind_figures
+from backdrive_bayes.number_text import significant
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Picture, Table
-from backdrive_bayes.report.numbers import significant
 from backdrive_bayes.results import BLIND, read_result
 
 TITLE = "Blind check"

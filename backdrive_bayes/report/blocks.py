@@ -104,12 +104,15 @@ class Letterhead(Block):
 
 @dataclass(frozen=True)
 class About:
-    """What the overview tells of a fitted unit: facts by name, and key indicators (name, unit, text) at one loop."""
+    """What the overview tells of a fitted unit: facts by name, and key indicators (name, unit, text) at one loop; ``data`` tells
+    units of one name apart.
+    """
 
     unit: str
     facts: list[tuple[str, str]]
     loop: str
     indicators: list[tuple[str, str, str]]
+    data: str = ""
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from backdrive_bayes.figures.style import shown_unit
+from backdrive_bayes.number_text import interval_text, probability_text, significant
 from backdrive_bayes.report.blocks import Heading, Note, Paragraph, Table
-from backdrive_bayes.report.numbers import interval_text, probability_text, significant
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import free
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import record_labels
+from backdrive_bayes.number_text import UNDEFINED, fixed, like_interval, significant
 from backdrive_bayes.report.blocks import Note, Paragraph, Table
 from backdrive_bayes.report.fit_tables import INDICATORS
-from backdrive_bayes.report.numbers import UNDEFINED, fixed, like_interval, significant
 
 _TEXT = (
     "The classic evaluation fits eq. (20), reconstructed, to each branch by least squares. It gives no intervals; its branches "

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, comparison_figures
 from backdrive_bayes.figures.style import indicator_words, shown_unit
+from backdrive_bayes.number_text import interval_text, level_text, probability_text
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.claims_section import claims
 from backdrive_bayes.report.findings import findings_blocks, warned
-from backdrive_bayes.report.numbers import interval_text, level_text, probability_text
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import Free, digests, free
 from backdrive_bayes.results import COMPARISON, read_result

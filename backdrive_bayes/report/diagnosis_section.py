@@ -39,7 +39,7 @@ def chapter(folder: Path) -> Chapter:
         figures,
         outcome=", ".join(filter(None, [outcome(saved), warned(saved.result)])),
         terms=[Heading("Diagnosis"), Facts(TERMS)] if saved.result["which"] else [],
-        provisional=not (saved.result.get("convergence") or {"converged": True})["converged"],
+        provisional=bool(saved.result["outcome"]["exit_code"]),
     )
 
 

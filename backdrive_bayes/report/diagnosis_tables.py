@@ -13,9 +13,9 @@ from backdrive_bayes.figures.diagnosis_words import (
     signed,
 )
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, shown_unit
+from backdrive_bayes.number_text import decimals, fixed, interval_text, level_text, probability_text, significant
 from backdrive_bayes.report.blocks import Note, Paragraph, Table
 from backdrive_bayes.report.fit_tables import INDICATORS
-from backdrive_bayes.report.numbers import decimals, fixed, interval_text, level_text, significant
 from backdrive_bayes.report.text import free
 
 TOP = 6
@@ -26,13 +26,6 @@ MOVED = 1.0
 
 def _arcmin(value):
     return significant(value, 3, ARCMIN_PER_RAD)
-
-
-def probability_text(probability: float | None) -> str:
-    """A probability with three decimals that never claims certainty."""
-    if probability is not None and 0 < probability < 5e-4:
-        return "<0.001"
-    return ">0.999" if probability is not None and 0.9995 <= probability < 1 else fixed(probability, 3)
 
 
 def gap_text(saved: Diagnosed) -> str:

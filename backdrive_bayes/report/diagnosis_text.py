@@ -5,8 +5,8 @@ from __future__ import annotations
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, more_words, share_text
 from backdrive_bayes.figures.style import in_words
+from backdrive_bayes.number_text import significant
 from backdrive_bayes.report.blocks import Facts, Paragraph
-from backdrive_bayes.report.numbers import significant
 from backdrive_bayes.report.sentences import proposal
 from backdrive_bayes.report.text import Free, free
 
@@ -27,10 +27,11 @@ TERMS = [
 
 def verdict(saved: Diagnosed) -> tuple[str, str, str]:
     """Tone, title and text of the banner."""
-    if saved.inconclusive:
-        reason = free(saved.inconclusive, 400).rstrip(".")
+    outcome = saved.result["outcome"]
+    if outcome["exit_code"]:
+        reason = free(outcome["reason"], 400).rstrip(".")
         text = Free(f"Reason: {reason}. Do not name a cause from this result.")
-        return "bad", "INCONCLUSIVE: no effect is named", text
+        return "bad", f"{outcome['word'].upper()}: no effect is named", text
     where = free(saved.summary, 400)
     if not saved.effects:
         return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))

@@ -7,6 +7,7 @@ from pathlib import Path
 from backdrive_bayes.figures.catalogue import caption, figures_of
 from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import PER_FIGURE, record_labels, words
+from backdrive_bayes.number_text import fixed, level_text
 from backdrive_bayes.report import fit_tables as tables
 from backdrive_bayes.report.blocks import (
     About,
@@ -21,7 +22,6 @@ from backdrive_bayes.report.blocks import (
 )
 from backdrive_bayes.report.classic_tables import least_squares
 from backdrive_bayes.report.findings import findings_blocks, warned
-from backdrive_bayes.report.numbers import fixed, level_text
 from backdrive_bayes.report.parameter_tables import meanings, parameters
 from backdrive_bayes.report.text import digests, free
 
@@ -38,7 +38,6 @@ def chapter(folder: Path) -> Chapter:
     saved = Saved.read(folder)
     figures = figures_of(saved, _shown)
     level = saved.indicators["level"]
-    converged = bool(saved.indicators["convergence"]["converged"])
     shown = ["loop"]
     rest = [name for name in figures if name not in shown]
     return Chapter(
@@ -56,7 +55,7 @@ def chapter(folder: Path) -> Chapter:
         [*(Picture(name, caption(name, level), spilt=True) for name in shown), *_details(saved, rest)],
         figures,
         outcome=", ".join(filter(None, [_outcome(saved), warned(saved.indicators)])),
-        provisional=not converged,
+        provisional=bool(saved.indicators["outcome"]["exit_code"]),
         terms=[Heading("Parameters and sampling"), Note(meanings(saved)), Note(tables.CRITERIA)],
         about=_about(saved),
     )
@@ -69,8 +68,9 @@ def _shown(name):
 
 def _outcome(saved):
     records = saved.records
-    state = "converged" if saved.indicators["convergence"]["converged"] else "NOT converged, provisional"
-    return f"{state}; {len(records)} record{'s'[: len(records) != 1]}"
+    outcome = saved.indicators["outcome"]
+    provisional = ", provisional" if outcome["exit_code"] else ""
+    return f"{outcome['word'].upper()}{provisional}; {len(records)} record{'s'[: len(records) != 1]}"
 
 
 def _about(saved) -> About:
@@ -80,7 +80,7 @@ def _about(saved) -> About:
     told = [(k, str(identity[k])) for k in ON_OVERVIEW if identity.get(k)]
     rows = [(name, unit, tables.indicator_text(key, record, factor)) for key, name, unit, factor in tables.INDICATORS]
     loop = f"{record['loading_rate_Nm_per_s']:.2g} N·m/s, ±{record['amplitude_Nm']:.2g} N·m"
-    return About(str(saved.indicators["unit"]), told, loop, rows)
+    return About(str(saved.indicators["unit"]), told, loop, rows, ",".join(saved.indicators["data_sha256"]))
 
 
 ON_OVERVIEW = ("description", "serial", "bench", "operator", "test date", "test_date", "origin")
@@ -93,12 +93,11 @@ def _verdict(saved):
         f"Largest R-hat {fixed(found['max_rhat'], 3)}; smallest effective sample size "
         f"{fixed(found['min_bulk_ess'], 0)} (bulk) and {fixed(found['min_tail_ess'], 0)} (tail)."
     )
-    if found["converged"]:
-        return Banner("good", "CONVERGED: the intervals may be used", numbers)
-    why = found.get("contradictions") or [found.get("advice") or "check the records"]
-    text = f"Do not use these intervals: {free('; '.join(why), 600).rstrip('.')}. {numbers}"
-    title = "the fit contradicts the measurement" if found.get("contradictions") else "the sampling has not converged"
-    return Banner("bad", f"INCONCLUSIVE: {title}", text)
+    outcome = saved.indicators["outcome"]
+    if not outcome["exit_code"]:
+        return Banner("good", f"{outcome['word'].upper()}: the intervals may be used", numbers)
+    text = f"Do not use these intervals: {free(outcome['reason'], 600).rstrip('.')}. {numbers}"
+    return Banner("bad", outcome["word"].upper(), text)
 
 
 def _identity(saved):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, parts, record_labels, shown_unit, words
+from backdrive_bayes.number_text import fixed, interval_text, level_text, significant
 from backdrive_bayes.report.blocks import Note, Table
-from backdrive_bayes.report.numbers import fixed, interval_text, level_text, significant
 from backdrive_bayes.report.text import free
 
 INDICATORS = (

@@ -14,7 +14,7 @@ MOST_FACTS = 6
 
 def overview_blocks(chapters: list[Chapter], title: str, written: str) -> list[Block]:
     """Date, units, outcomes, key indicators and contents of the report's chapters."""
-    units = {c.about.unit: c.about for c in chapters if c.about}
+    units = {(c.about.unit, c.about.data): c.about for c in chapters if c.about}
     facts = [("Results of", written), ("Software", f"backdrive-bayes {version('backdrive-bayes')}")]
     facts += [(name, text) for name, text in _units(units.values())][:MOST_FACTS]
     rows = [[free(c.title, 60), c.outcome or "–"] for c in chapters]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import shown_unit, words
+from backdrive_bayes.number_text import interval_text, level_text
 from backdrive_bayes.report.blocks import Table
-from backdrive_bayes.report.numbers import interval_text, level_text
 from backdrive_bayes.report.text import free
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -26,19 +25,12 @@ _LAYOUT = ("template.typ", "company.typ")
 def write_report(folders: Iterable[Path], out_pdf: Path, template: CompanyTemplate | None = None) -> Path:
     """Write one PDF of all results in ``folders``, dressed in a company's template; the same input gives the same bytes.
 
-    Raises BadInput for a folder without results or a logo that cannot be drawn, MissingExtra without typst or matplotlib.
+    Raises BadInput for a folder without results or with results of different data, or a logo that cannot be drawn, MissingExtra
+    without typst or matplotlib.
     """
-    pdf = report_bytes([Path(f) for f in folders], template)
-    out_pdf = Path(out_pdf)
+    pdf, out_pdf = report_bytes([Path(f) for f in folders], template), Path(out_pdf)
     out_pdf.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(suffix=".pdf", dir=out_pdf.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(pdf)
-        Path(temporary).chmod(0o644)
-        os.replace(temporary, out_pdf)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
+    out_pdf.write_bytes(pdf)
     return out_pdf
 
 

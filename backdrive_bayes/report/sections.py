@@ -7,6 +7,15 @@ from pathlib import Path
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.report import acceptance_section, blind_section, comparison_section, diagnosis_section, fit_section
 from backdrive_bayes.report.blocks import Chapter
+from backdrive_bayes.results import (
+    DIAGNOSIS,
+    INDICATORS,
+    VERDICT,
+    read_groups,
+    read_result,
+    require_own_posterior,
+    require_same_data,
+)
 
 SECTIONS = {
     "verdict.json": acceptance_section.chapter,
@@ -19,14 +28,28 @@ SECTIONS = {
 
 
 def chapters(folder: Path) -> list[Chapter]:
-    """The chapters of all results in a folder; BadInput where there is none."""
+    """The chapters of all results in a folder; BadInput where there is none, or where they are not of the same data."""
     folder = Path(folder)
     if not folder.is_dir():
         raise BadInput(folder, "a result folder", "no such folder")
+    _require_one_unit(folder)
     found = [_chapter(make, folder / name) for name, make in SECTIONS.items() if (folder / name).exists()]
     if not found:
         raise BadInput(folder, f"a result folder with {' or '.join(SECTIONS)}", "none of them")
     return found
+
+
+def _require_one_unit(folder: Path) -> None:
+    """BadInput where fit, diagnosis and verdict of a folder do not belong together."""
+    schemas = {"indicators.json": INDICATORS, "diagnosis.json": DIAGNOSIS, "verdict.json": VERDICT}
+    found = {name: read_result(folder / name, schema) for name, schema in schemas.items() if (folder / name).exists()}
+    path = folder / "posterior.nc"
+    if "indicators.json" in found and path.exists():
+        require_own_posterior(path, read_groups(path)["posterior"].attrs, found["indicators.json"])
+    about = next(iter(found.values()), None)
+    for name, result in found.items():
+        # A verdict rests on the fit, whichever version made that.
+        require_same_data(folder / name, result, about, version=name == "diagnosis.json" and "indicators.json" in found)
 
 
 def _chapter(make, path: Path) -> Chapter:

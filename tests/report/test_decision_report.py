@@ -15,10 +15,10 @@ from backdrive_bayes.decisions.comparison import compare
 from backdrive_bayes.decisions.global_risk import Process
 from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.number_text import interval_text, probability_text
 from backdrive_bayes.report import report, sections
 from backdrive_bayes.report.blocks import Chapter, Heading, Paragraph
 from backdrive_bayes.report.claims_section import _count, _number
-from backdrive_bayes.report.numbers import interval_text, probability_text
 from backdrive_bayes.results import COMPARISON, read_result
 
 ARCMIN = 10800 / 3.141592653589793

@@ -9,8 +9,8 @@ import pytest
 from support_results import GROUP_ATTRIBUTES, indicators, write_result
 
 from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.number_text import interval_text, significant
 from backdrive_bayes.report import report
-from backdrive_bayes.report.numbers import interval_text, significant
 from backdrive_bayes.report.text import cut, free, printable, typeset
 
 HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref //"

@@ -7,7 +7,7 @@ import numpy as np
 from support_results import indicators
 
 from backdrive_bayes.decisions.evidence import Evidence
-from backdrive_bayes.decisions.loops import same
+from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 from support.made_posterior import made_fit
 
 TYPICAL = {
@@ -49,8 +49,8 @@ class Invented:
 
     def values(self, name, rate, amplitude, kept=False):
         """Measured loops as they are, others grown from the largest of the rate."""
-        at_rate = [i for i, r in enumerate(self.rates) if same(r, rate, 0.1)]
-        records = [i for i in at_rate if same(self.amplitudes[i], amplitude, 0.02)]
+        at_rate = [i for i, r in enumerate(self.rates) if same_rate(r, rate)]
+        records = [i for i in at_rate if same_amplitude(self.amplitudes[i], amplitude)]
         factor = 1.0
         if not records:
             records = [max(at_rate, key=lambda i: self.amplitudes[i])]
