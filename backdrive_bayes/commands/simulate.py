@@ -2,35 +2,50 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 from pathlib import Path
 
 from backdrive_bayes.bench.benches import BENCHES, DEFAULT_BENCH
-from backdrive_bayes.bench.registry import EFFECTS
+from backdrive_bayes.bench.registry import EFFECTS, NONE, UNKNOWN
 from backdrive_bayes.commands.output import say, write_folder, write_json
 from backdrive_bayes.errors import BadInput
 
 HELP = "make the records of a virtual bench: a reducer with any effects, as a unit folder"
-EFFECT_HELP = (
-    "effect and severity, repeatable. Severity is from 0 to 10, default 1: the effect stands 8 to 15 noise standard deviations "
-    "out of what the reducer's parameters can absorb; 0.4 is clear, 0.2 weak, 0.1 hardly to be seen. Effects: "
-    f"{', '.join(f'{name} ({words})' for name, words in EFFECTS.items())}, unknown (one that no library lists), none"
-)
+SEVERITIES = {
+    "1": "8 to 15 noise sds more than the parameters absorb (default)",
+    "0.4": "clear",
+    "0.2": "weak",
+    "0.1": "hardly to be seen",
+    "0": "not there",
+}
+"""Severities, which are any number from 0 to 10, and what they look like (see bench/severity.py)."""
 MOST_SAMPLES = 5_000_000
 
 
 def add_arguments(parser) -> None:
     """Options of this verb."""
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME[=SEVERITY]", help=EFFECT_HELP)
+    what = "effect, and its severity (default 1); repeatable. Both are listed below"
+    parser.add_argument("--effect", action="append", default=[], metavar="NAME[=SEVERITY]", help=what)
     benches = ", ".join(BENCHES)
     parser.add_argument("--bench", default=DEFAULT_BENCH, metavar="NAME", help=f"mechanics: {benches} (default {DEFAULT_BENCH})")
-    parser.add_argument("--rates", default="0.1,0.5,1", metavar="R,…", help="loading rates in rated torques per second")
-    parser.add_argument("--amplitudes", default="1", metavar="A,…", help="amplitudes as shares of the rated torque")
+    rates = "loading rates in rated torques per second (default 0.1,0.5,1)"
+    parser.add_argument("--rates", default="0.1,0.5,1", metavar="R,…", help=rates)
+    parser.add_argument("--amplitudes", default="1", metavar="A,…", help="amplitudes as shares of the rated torque (default 1)")
     parser.add_argument("--cycles", default="1", metavar="N", help="cycles of each record (default 1)")
-    parser.add_argument("--hertz", default="1000", metavar="F", help="sampling frequency (default 1000)")
+    parser.add_argument("--hertz", default="1000", metavar="F", help="sampling frequency in hertz (default 1000)")
     parser.add_argument("--kind", metavar="KIND", help="one of the bench's kinds of reducer (default: at random)")
     parser.add_argument("--soil", default="1", metavar="LEVEL", help="small faults of every bench (default 1, 0 is none)")
     parser.add_argument("--truth", type=Path, metavar="FILE", help="also write the truth, to this file outside OUT")
+    parser.formatter_class, parser.epilog = argparse.RawDescriptionHelpFormatter, _lists()
+
+
+def _lists() -> str:
+    """Effects and severities, a line each."""
+    effects = EFFECTS | {UNKNOWN: "one that no library lists, drawn at random", NONE: "a clean reducer (default)"}
+    blocks = {"effects": effects, "severities (any number from 0 to 10)": SEVERITIES}
+    lines = [[f"{title}:", *(f"  {name:<25} {words}" for name, words in rows.items())] for title, rows in blocks.items()]
+    return "\n\n".join("\n".join(block) for block in lines)
 
 
 def run(args) -> int:

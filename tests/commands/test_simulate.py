@@ -7,6 +7,7 @@ import pytest
 from backdrive_bayes.bench.benches import BENCHES
 from backdrive_bayes.bench.registry import EFFECTS
 from backdrive_bayes.commands.main import main
+from backdrive_bayes.commands.simulate import SEVERITIES
 from backdrive_bayes.records.unit_folder import read_unit
 
 QUICK = ["--rates", "1,5", "--hertz", "200"]
@@ -48,11 +49,15 @@ def test_another_bench_is_another_reducer(tmp_path):
     assert len(names["ode"]["held"]["angle_rad"]) > 800
 
 
-def test_help_lists_effects_and_benches(capsys):
+def test_help_lists_effects_severities_and_defaults_a_line_each(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     assert main(["simulate", "--help"]) == 0
-    shown = " ".join(capsys.readouterr().out.split())
-    assert all(f"{name} ({words})" in shown for name, words in EFFECTS.items())
-    assert all(name in shown for name in BENCHES) and "default 1" in shown
+    text = capsys.readouterr().out
+    shown = [" ".join(line.split()) for line in text.splitlines()]
+    assert all(f"{name} {words}" in shown for name, words in (EFFECTS | SEVERITIES).items())
+    assert all(name in text for name in BENCHES) and all(len(line) <= 88 for line in shown)
+    defaults = ("default 1)", "default sliders)", "default 0.1,0.5,1)", "default 1000)", "a clean reducer (default)")
+    assert all(words in " ".join(shown) for words in defaults)
 
 
 @pytest.mark.parametrize(
