@@ -1,12 +1,13 @@
 # make demo: set up and run the main job on the packaged data, ending in reports/demo/report.pdf
 # make test: set up and run the tests
+# make docs: set up and build the documentation into build/docs; a warning is an error
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS := 1
 export MPLBACKEND := Agg
 
-.PHONY: demo test lint clean
+.PHONY: demo test docs lint clean
 
 demo: $(VENV)/ready
 	$(BIN)/backdrive-bayes demo
@@ -14,6 +15,9 @@ demo: $(VENV)/ready
 
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+docs: $(VENV)/ready
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 
 lint: $(VENV)/ready
 	$(BIN)/python -m pip install --quiet ruff
