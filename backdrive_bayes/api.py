@@ -7,14 +7,26 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
-from backdrive_bayes.commands.output import write_folder, write_json
-from backdrive_bayes.commands.results import FitOptions, diagnose_unit, draw_figures, fit_unit, is_result, keep_fit, stamped_by
+from backdrive_bayes.commands.door import collected, judged
+from backdrive_bayes.commands.output import write_file, write_folder, write_json
+from backdrive_bayes.commands.results import (
+    FitOptions,
+    diagnose_unit,
+    draw_figures,
+    fit_unit,
+    is_result,
+    keep_fit,
+    refuse_company,
+    retire,
+    stamped_by,
+)
 from backdrive_bayes.decisions.acceptance import assess
 from backdrive_bayes.decisions.claims import read_claims
 from backdrive_bayes.decisions.comparison import ROPE
 from backdrive_bayes.decisions.comparison import compare as compare_evidence
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.limits import Limits, read_limits
+from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.indicators.loads import loads_json
 from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.records import record
@@ -50,7 +62,7 @@ class Fit:
     @property
     def converged(self) -> bool:
         """Whether every parameter and indicator passed the diagnostics and the measurement does not contradict."""
-        return bool(self.indicators["convergence"]["converged"])
+        return self.indicators["outcome"]["word"] == "converged"
 
     def back_drive(self, *loads: float, rate: float | None = None) -> list[dict]:
         """Angle θ_L [rad] and energy W_L [J] with intervals for loads [N·m] at a rate [N·m/s], by default every measured one."""
@@ -61,13 +73,13 @@ class Fit:
         """Write indicators.json, posterior.nc and figures, as the verb ``fit`` does."""
         with write_folder(folder) as room:
             keep_fit(self.posterior, self.indicators, room, figures)
+            retire(Path(folder), self.indicators)
         return Path(folder)
 
     def _repr_html_(self):
         names = list(self.indicators["records"][0]["indicators"])
         rows = [[r["file"], *(_interval(r["indicators"][n]) for n in names)] for r in self.indicators["records"]]
-        state = "converged" if self.converged else "NOT converged"
-        return _title(self.indicators["unit"], state) + _table(["record", *names], rows)
+        return _title(self.indicators["unit"], line(self.indicators["outcome"])) + _table(["record", *names], rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +104,13 @@ class Diagnosis:
         with write_folder(folder) as room:
             write_json(room / "diagnosis.json", self.result)
             keep_fit(self.fit.posterior, self.fit.indicators, room, figures)
+            retire(Path(folder), self.fit.indicators)
         return Path(folder)
 
     def _repr_html_(self):
         rows = [[name, probability_text(p)] for name, p in self.probabilities.items() if p >= 0.005]
         where = html.escape(self.result["where"]["summary"])
-        named = " + ".join(self.effects) or "no gap"
+        named = f"{line(self.result['outcome'])}: {' + '.join(self.effects) or 'no gap'}"
         return _title(self.result["unit"], named) + _table(["effect", "probability"], rows) + f"<p>{where}</p>"
 
 
@@ -113,11 +126,12 @@ class Verdict:
         return self.result["verdict"]
 
     def save(self, folder: Path | str, figures: bool = True) -> Path:
-        """Write verdict.json and its figures, as the verb ``accept`` does."""
+        """Write verdict.json and its figures, as the verb ``accept`` does; BadInput beside a fit of other data."""
+        refuse_company(Path(folder), self.result)
         return _save(self.result, "verdict.json", "save_verdict_figures", folder, figures)
 
     def __str__(self):
-        return f"{self.result['unit']}: {self.verdict}; {self.result['reason']}"
+        return f"{self.result['unit']}: {line(self.result['outcome'])}"
 
     def _repr_html_(self):
         rows = [
@@ -127,7 +141,7 @@ class Verdict:
         ]  # fmt: skip
         names = ["indicator", "rate [N·m/s]", "amplitude [N·m]", "limits", "posterior", "conformance", "verdict"]
         advice = f"<p>{html.escape(self.result['next']['do'])}</p>" if self.result["next"] else ""
-        return _title(self.result["unit"], f"{self.verdict}; {self.result['reason']}") + _table(names, rows) + advice
+        return _title(self.result["unit"], line(self.result["outcome"])) + _table(names, rows) + advice
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,36 +175,40 @@ class Comparison:
         return out
 
 
-def fit(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, loads=(), load_rate=None, progress=None) -> Fit:
+def fit(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, loads=(), load_rate=None, force=False, progress=None) -> Fit:
     """Posterior and indicators of a unit (or of the path of one); ``progress`` receives lines about the state of the run.
 
     ``loads`` [N·m], arriving at ``load_rate`` [N·m/s] or at every measured rate, are answered under ``indicators["loads"]``.
+    BadInput where the check finds the data unfit, unless ``force``, which the result says.
     """
     given = {} if baseline is None else {"baseline": tuple(baseline)}
     options = FitOptions(k=k, level=level, seed=seed, loads=tuple(loads), load_rate=load_rate, **given)
-    unit = unit if isinstance(unit, record.Unit) else Unit.read(unit)
-    return Fit(*fit_unit(unit, options, progress or (lambda text: None)))
+    ready = _ready(unit, k, force)
+    return _fitted(ready, *fit_unit(ready.unit, options, progress or (lambda text: None)))
 
 
-def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, progress=None) -> Diagnosis:
+def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, force=False, progress=None) -> Diagnosis:
     """Where model and measurement part, which effect causes it, and the fit of the model with it, as for :func:`fit`."""
     given = {} if baseline is None else {"baseline": tuple(baseline)}
-    unit = unit if isinstance(unit, record.Unit) else Unit.read(unit)
-    options = FitOptions(k=k, level=level, seed=seed, **given)
-    result, sampled = diagnose_unit(unit, options, progress or (lambda text: None))
-    return Diagnosis(result, Fit(*sampled))
+    options, ready = FitOptions(k=k, level=level, seed=seed, **given), _ready(unit, k, force)
+    result, sampled = diagnose_unit(ready.unit, options, progress or (lambda text: None))
+    return Diagnosis(ready.stamp(result), _fitted(ready, *sampled))
 
 
 def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
-    """The verdict on a fitted unit against limits (a file or :class:`Limits`).
+    """The verdict on a unit against limits (a file or :class:`Limits`).
 
-    ``fitted`` is a fit, the folder of one, or a list of fits of one unit under several models with their ``probabilities``;
-    ``batch`` are fits of other units of the same process, for global risks.
+    ``fitted`` is a unit or the path of one, which is fitted and diagnosed; a fit or the folder of one, whose structure only a
+    diagnosis beside it examines; a diagnosis, which judges the model it chose; or a list of fits of one unit under several
+    models with their ``probabilities``. ``batch`` are fits of other units of the same process, for global risks.
     """
     models = list(fitted) if isinstance(fitted, list | tuple) else [fitted]
+    name = "" if isinstance(limits, Limits) else Path(limits).name
     limits = limits if isinstance(limits, Limits) else read_limits(limits)
-    evidences, others = [_evidence(m) for m in models], [_evidence(b) for b in batch]
-    return Verdict(stamped_by(assess(evidences, limits, probabilities, others), [*evidences, *others]))
+    evidences, others = [_evidence(m, examined=True) for m in models], [_evidence(b) for b in batch]
+    result = assess(evidences, limits, probabilities, others) | collected([evidences[0].about])
+    options = {"limits": name, "models": len(models), "batch": [other.name for other in others]}
+    return Verdict(stamped_by(result, evidences[:1], **options))
 
 
 def compare(*fitted, claims=None, rope: float = ROPE, seed: int = 0) -> Comparison:
@@ -198,6 +216,7 @@ def compare(*fitted, claims=None, rope: float = ROPE, seed: int = 0) -> Comparis
     evidences = [_evidence(f) for f in fitted]
     level = evidences[0].about["level"] if evidences else 0.9
     result = compare_evidence(evidences, read_claims(claims) if claims else None, rope, level, seed)
+    result |= collected([e.about for e in evidences])
     return Comparison(stamped_by(result, evidences, seed, rope=rope, claims=Path(claims or "").name))
 
 
@@ -206,24 +225,41 @@ def report(*results, out: Path | str, template: Path | str | None = None) -> Pat
 
     ``template`` is a folder with a company's template.toml and logo.
     """
-    from backdrive_bayes.commands.report import read_template
+    from backdrive_bayes.commands.report import NAME, read_template
     from backdrive_bayes.report.report import write_report
 
     folders = []
     for number, result in enumerate(results, 1):
         own = Path(out) / f"{number}-{type(result).__name__.lower()}"
         folders.append(Path(result) if isinstance(result, str | Path) else result.save(own, figures=False))
-    return write_report(folders, Path(out) / "report.pdf", read_template(template) if template else None)
+    with write_file(Path(out) / NAME) as temporary:
+        write_report(folders, temporary, read_template(template) if template else None)
+    return Path(out) / NAME
 
 
-def _evidence(fitted) -> Evidence:
+def _ready(unit, k, force):
+    if isinstance(unit, record.Unit):
+        return judged(unit, k, force)
+    return judged(Unit.read(unit), k, force, unit)
+
+
+def _fitted(ready, posterior, indicators) -> Fit:
+    ready.stamp(indicators)["notes"] += ready.lines
+    return Fit(posterior, indicators)
+
+
+def _evidence(fitted, examined: bool = False) -> Evidence:
+    """Draws to decide on; ``examined`` asks for the diagnosis of a unit that is fitted for them."""
     if isinstance(fitted, Fit):
         return fitted.evidence
     if isinstance(fitted, Diagnosis):
         return replace(fitted.fit.evidence, diagnosis=fitted.result)
     if isinstance(fitted, Evidence):
         return fitted
-    return Evidence.read(Path(fitted)) if is_result(Path(fitted)) else fit(fitted).evidence
+    if not isinstance(fitted, record.Unit) and is_result(Path(fitted)):
+        return Evidence.read(Path(fitted))
+    found = fit(fitted).evidence
+    return replace(found, diagnosis=diagnose(fitted).result) if examined else found
 
 
 def _save(result, name, figures_of, folder, figures):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
+
+import numpy as np
 
 from backdrive_bayes.errors import BadInput
 
@@ -12,7 +15,15 @@ DIAGNOSIS = "backdrive-bayes/diagnosis/1"
 VERDICT = "backdrive-bayes/verdict/1"
 COMPARISON = "backdrive-bayes/comparison/1"
 BLIND = "backdrive-bayes/blind/1"
+CHECK = "backdrive-bayes/check/1"
+PREDICTION = "backdrive-bayes/prediction/1"
+FLEET = "backdrive-bayes/fleet/1"
+POOL = "backdrive-bayes/pool/1"
 POSTERIOR = "backdrive-bayes/posterior/2"
+GROUPS = ("posterior", "unconstrained_posterior", "sample_stats", "posterior_predictive", "observed_data", "constant_data")
+"""The groups of a posterior file."""
+SEAL = "content_sha256"
+"""Attribute of every group: the digest of all of them."""
 UNREADABLE = (OSError, ValueError, LookupError, RuntimeError, TypeError, AttributeError, ArithmeticError, MemoryError)
 """What the readers of HDF5 raise on a damaged file."""
 
@@ -43,3 +54,63 @@ def read_group(path: Path, group: str):
     if loaded.attrs.get("schema") != POSTERIOR:
         raise BadInput(path, f"schema '{POSTERIOR}'", repr(loaded.attrs.get("schema")))
     return loaded
+
+
+def read_groups(path: Path) -> dict:
+    """All groups of a posterior file by name; BadInput where it is not as it was written."""
+    groups = {name: read_group(path, name) for name in GROUPS}
+    try:
+        whole = {g.attrs.get(SEAL) for g in groups.values()} == {digest_of(groups)}
+    except (TypeError, ValueError):
+        whole = False
+    if not whole:
+        raise BadInput(path, "the file as it was written", "changed or missing bytes (fit the unit again)")
+    return groups
+
+
+def digest_of(groups: dict) -> str:
+    """SHA-256 of the names, values and attributes of datasets by group, the seal itself left out."""
+    seal = hashlib.sha256()
+    for name in sorted(groups):
+        attributes = {k: str(v) for k, v in groups[name].attrs.items() if k != SEAL}
+        seal.update(json.dumps([name, attributes], sort_keys=True).encode())
+        for variable in sorted(map(str, groups[name].data_vars)):
+            values = np.ascontiguousarray(groups[name][variable].values)
+            seal.update(f"{variable}{values.shape}{values.dtype.kind}{values.dtype.itemsize}".encode() + values.tobytes())
+    return seal.hexdigest()
+
+
+def require_own_posterior(path: Path, attributes: dict, about: dict) -> None:
+    """BadInput unless the posterior file with these attributes is the one that an indicators object was written with."""
+    own = {"unit": attributes.get("unit"), "data_sha256": str(attributes.get("data_sha256")).split(",")}
+    _require_equal(path, own, about, ("unit", "data_sha256"))
+    _require_equal(path, {"posterior_sha256": attributes.get(SEAL)}, about, ("posterior_sha256",))
+
+
+def require_same_data(path: Path, result: dict, about: dict, version: bool = True) -> None:
+    """BadInput unless the result at ``path`` is of the unit, the data and (unless it rests on the fit) the version of an
+    indicators object.
+    """
+    _require_equal(path, result, about, ("unit", "data_sha256", "unit_sha256", *(("version",) if version else ())))
+
+
+_NAMES = {
+    "unit": "a result of unit",
+    "data_sha256": "data with SHA-256",
+    "unit_sha256": "a unit file with SHA-256",
+    "version": "a result of version",
+    "posterior_sha256": "the posterior with SHA-256",
+}
+
+
+def _require_equal(path, result, about, keys):
+    for key in keys:
+        if about.get(key) is None:
+            raise BadInput(path, "complete result files in one folder", f"one without '{key}' (compute it again)")
+        if result.get(key) != about[key]:
+            raise BadInput(path, f"{_NAMES[key]} {_shown(about.get(key))}, as indicators.json has", _shown(result.get(key)))
+
+
+def _shown(value) -> str:
+    values = value if isinstance(value, list) else [value]
+    return ", ".join("none" if v in (None, "") else str(v)[:12 if len(str(v)) == 64 else 60] for v in values[:4]) or "none"

@@ -1,12 +1,15 @@
 """Small virtual records and unit folders for the tests of reading, checking and the command line."""
 
 import gzip
+import os
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 SHARED = Path(__file__).resolve().parents[1] / ".." / "shared"
+os.environ["COLUMNS"] = "120"
 FULL_CYCLE = (0.0, 1.0, -1.0, 1.0)
 
 
@@ -57,3 +60,25 @@ def shared_data():
     if not folder.is_dir():
         pytest.skip("the shared bench data are not on this machine")
     return folder.resolve()
+
+
+@pytest.fixture(scope="session")
+def two_workers():
+    """A client of two worker processes on this machine."""
+    pytest.importorskip("distributed", reason="the extra fleet is not installed")
+    from backdrive_bayes.fleet import cluster
+
+    with cluster.local(2) as client:
+        yield client
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 256 kB and a function that makes it read-only."""
+    room = tmp_path / "disk"
+    room.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(room)], capture_output=True, text=True)
+    if made.returncode:
+        pytest.skip(f"a file system of its own needs the right to mount ({made.stderr.strip()})")
+    yield room, lambda: subprocess.run(["mount", "-o", "remount,ro", str(room)], check=True)
+    subprocess.run(["umount", "-l", str(room)], check=True)

@@ -4,6 +4,9 @@ import json
 
 import numpy as np
 import xarray
+from support.told import told
+
+from backdrive_bayes.results import SEAL, digest_of
 
 GROUP_ATTRIBUTES = {
     "schema": "backdrive-bayes/posterior/2",
@@ -27,9 +30,9 @@ def write_result(folder, records=2, shared=PARAMETERS, **changes):
     ``shared`` maps names of shared parameters to unit and value.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    result = indicators(records, shared) | changes
+    digest = _write_posterior(folder / "posterior.nc", records, shared, changes.get("unit", "u"))
+    result = told(indicators(records, shared) | {"posterior_sha256": digest} | changes)
     (folder / "indicators.json").write_text(json.dumps(result), encoding="utf-8")
-    _write_posterior(folder / "posterior.nc", records, shared)
     return result
 
 
@@ -64,6 +67,7 @@ def indicators(records, shared=PARAMETERS):
         },
         "jitter": {"torque_Nm": 2e-5, "length_Nm": 1e-3},
         "data_sha256": ["0123456789abcdef" * 4],
+        "unit_sha256": "",
         "seed": 7,
         "versions": "backdrive-bayes 0.1.0; numpy 2.0; Python 3.11",
         "parameters": parameters,
@@ -134,7 +138,7 @@ def _curves(rising, falling):
     return {"rising_rad": rising.tolist(), "falling_rad": falling.tolist()}
 
 
-def _write_posterior(path, records, parameters):
+def _write_posterior(path, records, parameters, unit):
     rng = np.random.default_rng(1)
     legs = (("first", 0.0, 0.1), ("down", 0.1, -0.1), ("up", -0.1, 0.1))
     torque = np.concatenate([np.linspace(a, b, BLOCKS) for _, a, b in legs])
@@ -150,6 +154,7 @@ def _write_posterior(path, records, parameters):
     }
     groups = {
         "posterior": shared,
+        "unconstrained_posterior": {},
         "sample_stats": {"lp": (("chain", "draw"), rng.standard_normal((CHAINS, DRAWS)))},
         "posterior_predictive": {"angle_rad": (("chain", "draw", "block"), np.tile(angle, records) + noise)},
         "observed_data": {
@@ -164,6 +169,9 @@ def _write_posterior(path, records, parameters):
             "turning_record": (("turn",), np.repeat(np.arange(records), 4)),
         },
     }
-    for i, (name, variables) in enumerate(groups.items()):
-        data = xarray.Dataset(variables, attrs=GROUP_ATTRIBUTES)
-        data.to_netcdf(path, mode="a" if i else "w", group=name, engine="h5netcdf")
+    attributes = GROUP_ATTRIBUTES | {"unit": unit}
+    data = {name: xarray.Dataset(variables, attrs=attributes) for name, variables in groups.items()}
+    digest = digest_of(data)
+    for i, (name, dataset) in enumerate(data.items()):
+        dataset.assign_attrs({SEAL: digest}).to_netcdf(path, mode="a" if i else "w", group=name, engine="h5netcdf")
+    return digest

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -69,6 +70,8 @@ def _begin(threads: int) -> None:
     from threadpoolctl import threadpool_limits
 
     del sys.argv[1:]
+    # Whoever started this process is interrupted too, and ends it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threadpool_limits(threads)
 
 

@@ -5,24 +5,28 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from backdrive_bayes.commands.door import FORCED, collected, repeat_findings
+from backdrive_bayes.commands.door import collected, ready_unit, repeat_findings
 from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
     FitOptions,
     add_fit_arguments,
+    diagnose_unit,
     draw_figures,
     fit_unit,
     is_result,
     keep_fit,
     keep_run,
-    ready_unit,
+    refuse_company,
+    retire,
     stamped_by,
 )
+from backdrive_bayes.commands.stages import ACCEPT
+from backdrive_bayes.commands.tables import show_indicators, show_limits
+from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.number_text import probability_text
 
-HELP = "accept, reject or ask for more about a unit against limits, by JCGM 106:2012"
+HELP = "accept, reject or ask for more about a unit against limits, by JCGM 106:2012; a unit is fitted and diagnosed for it"
 
 
 def add_arguments(parser) -> None:
@@ -41,9 +45,8 @@ def add_arguments(parser) -> None:
 
 
 def run(args) -> int:
-    """Write verdict.json and its figure, and what a new fit gives; 0 accepted, 3 rejected, 4 inconclusive."""
+    """Write verdict.json and its figure, and new fit and diagnosis; 0 accepted, 3 rejected, 4 inconclusive."""
     from backdrive_bayes.decisions.acceptance import assess
-    from backdrive_bayes.decisions.conformance import Verdict
     from backdrive_bayes.decisions.evidence import Evidence
     from backdrive_bayes.decisions.limits import read_limits
 
@@ -59,19 +62,25 @@ def run(args) -> int:
         made, evidence, out = _fit(args, limits, options)
     verdict = assess([evidence, *others], limits, probabilities, batch)
     verdict |= collected([evidence.about])
-    stamped_by(verdict, [evidence, *others, *batch])
+    named = {"limits": args.limits.name, "models": len(others) + 1, "batch": [other.name for other in batch]}
+    stamped_by(verdict, [evidence], **named)
+    if not made:
+        refuse_company(out, verdict)
     with progress() as note, write_folder(out) as folder:
         if made:
+            write_json(folder / "diagnosis.json", evidence.diagnosis)
             keep_fit(*made, folder, not args.no_figures, note)
+            retire(out, made[1])
         write_json(folder / "verdict.json", verdict)
         keep_run(folder, "accept", began)
         if not args.no_figures:
             draw_figures("save_verdict_figures", folder)
-    _summarise(verdict, out)
-    return Verdict(verdict["verdict"]).exit_code
+    _summarise(verdict, evidence.about, out)
+    return verdict["outcome"]["exit_code"]
 
 
 def _fit(args, limits, options):
+    """Fit and diagnosis of a unit: posterior and indicators object, the evidence that they are, and where to write."""
     from dataclasses import replace
 
     from backdrive_bayes.decisions.acceptance import limited_loops
@@ -87,10 +96,14 @@ def _fit(args, limits, options):
     wanted = {limit.k for limit in limits.limits if limit.k is not None}
     if len(wanted) > 1:
         raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))
-    with progress() as note:
-        posterior, result = fit_unit(unit, replace(options, k=wanted.pop()) if wanted else options, note)
+    options = replace(options, k=wanted.pop()) if wanted else options
+    with progress(*ACCEPT) as note:
+        posterior, result = fit_unit(unit, options, note)
+        # What acts beside the model would shift every number that is judged.
+        diagnosis, _ = diagnose_unit(unit, options, note, sample=False)
     ready.stamp(result)["notes"] += ready.lines
-    return (posterior, result), Evidence.of(posterior, result), args.out or default_out(unit.name, "accept")
+    evidence = replace(Evidence.of(posterior, result), diagnosis=ready.stamp(diagnosis))
+    return (posterior, result), evidence, args.out or default_out(unit.name, "accept")
 
 
 def _models(given):
@@ -112,22 +125,10 @@ def _models(given):
     return found, [1.0 - sum(probabilities), *probabilities]
 
 
-def _summarise(verdict: dict, out: Path) -> None:
-    forced = f" ({FORCED})" if verdict["forced"] else ""
-    say(f"{verdict['unit']}: {verdict['verdict'].upper()}{forced}")
-    say(f"  {verdict['reason']}")
-    for row in verdict["limits"]:
-        say(f"  {row['indicator']} at {row['loading_rate_Nm_per_s']:.3g} N·m/s, ±{row['amplitude_Nm']:.3g} N·m: {_shown(row)}")
-        if row["global"]:
-            found = row["global"]
-            say(f"    global risks: consumer's {found['consumer']:.2g}, producer's {found['producer']:.2g}")
+def _summarise(verdict: dict, indicators: dict, out: Path) -> None:
+    say(f"{verdict['unit']}: {line(verdict['outcome'])}")
+    show_indicators(indicators)
+    show_limits(verdict)
     if verdict["next"]:
-        say(f"  next: {verdict['next']['do']}")
+        say(f"next: {verdict['next']['do']}")
     say(f"written to {out}/verdict.json")
-
-
-def _shown(row: dict) -> str:
-    limits = ", ".join(f"{end} {row[end]:.4g}" for end in ("min", "max") if abs(row[end]) < float("inf"))
-    interval = f"{row['median']:.4g} [{row['lo']:.4g}, {row['hi']:.4g}] {row['unit']}".replace(" 1", "")
-    probability = probability_text(row["conformance_probability"])
-    return f"{interval} ({limits}), conforms with probability {probability}: {row['verdict']}"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 from pathlib import Path
 
+from backdrive_bayes.blind.seal import UNITS
 from backdrive_bayes.commands.output import say, write_json
 from backdrive_bayes.commands.progress import progress
+from backdrive_bayes.commands.results import stamped
+from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.errors import BadInput, MissingExtra
 
 HELP = "make units with a withheld effect, diagnose them without the key, then open the key and score"
@@ -43,11 +47,18 @@ def run(args) -> int:
         raise BadInput("--workers", "a number from 1", args.workers)
     with progress() as note:
         result = run_study(Study(request, out, diagnose_folder, write_json, *again, args.workers, note))
+    stamped(result, {"unit": "blind", "data_sha256": _data_sha256(out)}, args.seed, result["request"])
     write_json(out / NAME, result)
     if not args.no_figures:
         _draw(out)
     _summarise(result, out)
-    return 0
+    return result["outcome"]["exit_code"]
+
+
+def _data_sha256(out: Path) -> list[str]:
+    """SHA-256 of every record in the order of units and records."""
+    files = (f for f in sorted((out / UNITS).rglob("*")) if f.is_file() and f.suffix != ".toml")
+    return [hashlib.sha256(f.read_bytes()).hexdigest() for f in files]
 
 
 def _request(args):
@@ -81,6 +92,7 @@ def _draw(out: Path) -> None:
 
 
 def _summarise(result: dict, out: Path) -> None:
+    say(line(result["outcome"]))
     counts = result["counts"]
     say(f"{counts['units']} units diagnosed, {counts['failed']} without an answer; key {result['key_sha256'][:12]}…")
     for failure in result["failures"][:5]:

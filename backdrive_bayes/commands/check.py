@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.commands.output import complain, default_out, say, write_folder, write_json
+from backdrive_bayes.commands.results import origin, stamped
 
 HELP = "read and judge a unit's records: samples, branches, cycles, closure, noise"
 _ARCMIN = 10800.0 / 3.141592653589793
@@ -16,21 +17,20 @@ def add_arguments(parser) -> None:
 
 
 def run(args) -> int:
-    """Write check.json and show what it says; 2 where an error speaks against inference."""
-    from backdrive_bayes.records.check import check_unit
+    """Write check.json and show what it says; 0, or 2 where an error speaks against inference."""
+    from backdrive_bayes.records.check import LOST_MOTION_SHARE, check_unit
     from backdrive_bayes.records.unit_folder import read_unit
 
     unit = read_unit(args.unit)
-    result = check_unit(unit)
+    result = stamped(check_unit(unit), origin(unit), args.seed, {"k": LOST_MOTION_SHARE})
     out = args.out or default_out(unit.name, "check")
     with write_folder(out) as folder:
         write_json(folder / "check.json", result)
     _summarise(result)
     say(f"written to {out}/check.json")
-    if not result["may_infer"]:
-        complain(f"{args.unit}: expected data fit for inference, found {result['reason']}")
-        return 2
-    return 0
+    if result["outcome"]["exit_code"]:
+        complain(f"{args.unit}: expected data fit for inference, found {result['outcome']['reason']}")
+    return result["outcome"]["exit_code"]
 
 
 def _summarise(result: dict) -> None:
@@ -43,7 +43,8 @@ def _summarise(result: dict) -> None:
     for finding in result["findings"]:
         where = f"{finding['record']}: " if finding["record"] else ""
         say(f"  {finding['level']}: {where}{finding['text']}")
-    say(f"inference {'may go on' if result['may_infer'] else 'should not go on'}: {result['reason']}")
+    outcome = result["outcome"]
+    say(f"{outcome['word'].upper()}, inference {'should not' if outcome['exit_code'] else 'may'} go on: {outcome['reason']}")
 
 
 def _extent(record: dict) -> str:

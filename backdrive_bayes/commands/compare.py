@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from backdrive_bayes.commands.door import FORCED, collected, repeat_findings
+from backdrive_bayes.commands.door import collected, ready_unit, repeat_findings
 from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
@@ -16,11 +16,12 @@ from backdrive_bayes.commands.results import (
     is_result,
     keep_fit,
     keep_run,
-    ready_unit,
     stamped_by,
 )
+from backdrive_bayes.commands.stages import FIT
+from backdrive_bayes.commands.tables import show_claims, show_pair
+from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.number_text import probability_text
 
 HELP = "differences of units with intervals, and the probability of claims about them"
 
@@ -63,7 +64,7 @@ def run(args) -> int:
         if not args.no_figures:
             draw_figures("save_comparison_figures", folder)
     _summarise(result, out)
-    return 0 if result["converged"] else 4
+    return result["outcome"]["exit_code"]
 
 
 def _evidences(args, options):
@@ -80,7 +81,7 @@ def _evidences(args, options):
             evidences.append(ready)
             continue
         unit = ready.unit
-        with progress() as note:
+        with progress(*FIT) as note:
             posterior, result = fit_unit(unit, options, lambda text, name=unit.name, note=note: note(f"{name}: {text}"))
         ready.stamp(result)["notes"] += ready.lines
         evidences.append(Evidence.of(posterior, result))
@@ -90,33 +91,9 @@ def _evidences(args, options):
 
 
 def _summarise(result: dict, out: Path) -> None:
-    if result["forced"]:
-        say(FORCED)
-    if not result["converged"]:
-        say("INCONCLUSIVE: a unit's fit is not to be used")
+    say(line(result["outcome"]))
     for pair in result["pairs"]:
-        say(f"{pair['first']} against {pair['second']}: ratio [{result['level']:.0%} interval]")
-        for condition in pair["conditions"]:
-            predicted = f" (predicted: {', '.join(condition['predicted'])})" if condition["predicted"] else ""
-            say(f"  {condition['loading_rate_Nm_per_s']:.3g} N·m/s, ±{condition['amplitude_Nm']:.3g} N·m{predicted}")
-            say("    " + ", ".join(_ratios(condition["indicators"])))
-        for refused in pair["refused"]:
-            say(f"  not compared: {refused['unit']} at {refused['record']}: {refused['reason']}")
-    for claim in (result["claims"] or {}).get("claims", []):
-        probability = "" if claim["probability"] is None else f" (probability {probability_text(claim['probability'])})"
-        say(f"  claim {claim['id']}: {claim['claim']}: {claim['verdict']}{probability} {claim['reason']}".rstrip())
+        show_pair(pair, result["level"])
+    if result["claims"]:
+        show_claims(result["claims"]["claims"])
     say(f"written to {out}/comparison.json")
-
-
-def _ratios(indicators: dict):
-    names = (
-        ("lost_motion_rad", "δ"),
-        ("zero_torque_width_rad", "w(0)"),
-        ("peak_angle_rad", "peak"),
-        ("loop_area_J", "S"),
-        ("dissipation_ratio", "u"),
-    )
-    for key, symbol in names:
-        ratio = (indicators.get(key) or {}).get("ratio")
-        if ratio:
-            yield f"{symbol} {ratio['median']:.3g} [{ratio['lo']:.3g}, {ratio['hi']:.3g}] {indicators[key]['verdict']}"

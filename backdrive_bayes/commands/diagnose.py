@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from backdrive_bayes.commands.door import ready_unit
 from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
@@ -14,8 +15,13 @@ from backdrive_bayes.commands.results import (
     draw_figures,
     keep_fit,
     keep_run,
-    ready_unit,
+    refuse_company,
+    retire,
 )
+from backdrive_bayes.commands.stages import DIAGNOSE
+from backdrive_bayes.commands.tables import show_indicators, show_which
+from backdrive_bayes.decisions.outcome import line
+from backdrive_bayes.number_text import probability_text
 
 HELP = "find the unmodelled effect behind the gap between model and measurement"
 
@@ -34,33 +40,34 @@ def run(args) -> int:
     unit = ready.unit
     out = args.out or default_out(unit.name, "diagnose")
     require_out(out)
-    with progress() as note:
+    with progress(*DIAGNOSE) as note:
         result, sampled = diagnose_unit(unit, options, note, not args.no_posterior)
     ready.stamp(result)
-    if sampled is not None:
-        ready.stamp(sampled[1])
+    if sampled is None:
+        refuse_company(out, result)
+    else:
+        ready.stamp(sampled[1])["notes"] += ready.lines
     with write_folder(out) as folder:
         write_json(folder / "diagnosis.json", result)
         keep_run(folder, "diagnose", began)
         if sampled is not None:
             keep_fit(*sampled, folder, figures=False)
+            retire(out, sampled[1])
         if not args.no_figures:
             draw_figures("save_figures", folder)
-    _summarise(result, out)
-    return 4 if result["inconclusive"] else 0
+    _summarise(result, sampled, out)
+    return result["outcome"]["exit_code"]
 
 
-def _summarise(result: dict, out: Path) -> None:
-    if result["inconclusive"]:
-        say(f"{result['unit']}: INCONCLUSIVE, {result['inconclusive']}")
-    else:
-        top = ", ".join(f"{row['effect']} {row['probability']:.2f}" for row in result["which"][:3])
-        say(f"{result['unit']}: gap with probability {result['gap']['probability']:.2f}; {top}")
-        named, chosen = " + ".join(result["answer"]["effects"]) or "none", ", ".join(result["answer"]["credible_set_90"])
-        say(f"  answer: {named}; 90 % set: {chosen}")
-        if named != "unknown":
-            say(f"  something that is not listed acts with probability {result['gap']['unlisted_probability']:.2f}")
-        say(f"  where: {result['where']['summary']}")
+def _summarise(result: dict, sampled, out: Path) -> None:
+    say(f"{result['unit']}: {line(result['outcome'])}")
+    if not result["inconclusive"]:
+        say(f"a gap is there with probability {probability_text(result['gap']['probability'])}: {result['where']['summary']}")
+        say(f"answer: {' + '.join(result['answer']['effects']).replace('_', ' ') or 'no gap'}")
+        show_which(result)
+        say(f"something that is not listed acts with probability {probability_text(result['gap']['unlisted_probability'])}")
         closed = result["shrink"]["closed_fraction"]
-        say(f"  closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")
+        say(f"closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")
+    if sampled is not None:
+        show_indicators(sampled[1])
     say(f"written to {out}")

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from backdrive_bayes.commands.output import say
+from backdrive_bayes.decisions.outcome import FORCED, outcome_of
 from backdrive_bayes.errors import BadInput
-
-FORCED = "forced: the data are unfit, nothing that rests on them is to be trusted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +19,9 @@ class ReadyUnit:
     forced: bool = False
 
     def stamp(self, result: dict) -> dict:
-        """The result object with ``findings`` and ``forced``."""
+        """The result object with ``findings``, ``forced`` and the outcome that follows."""
         result["findings"], result["forced"] = self.checked["findings"], self.forced
+        result["outcome"] = outcome_of(result).to_json()
         return result
 
     @property
@@ -30,21 +30,28 @@ class ReadyUnit:
         return [message["text"] for message in self.checked["messages"] if message["level"] != "info"]
 
 
-def ready_unit(path: Path, k: float = 0.03, force: bool = False) -> ReadyUnit:
-    """Read and check a unit and repeat its warnings; ``k`` is the share of T_r at which lost motion is taken.
+def judged(unit, k: float = 0.03, force: bool = False, where: object = "") -> ReadyUnit:
+    """Check a unit; ``k`` is the share of T_r at which lost motion is taken.
 
-    Raises BadInput where the check finds errors, unless ``force``, which is said.
+    Raises BadInput, which names ``where``, for a unit in which the check finds errors, unless ``force``.
     """
     from backdrive_bayes.records.check import check_unit
     from backdrive_bayes.records.faults import without_wild
-    from backdrive_bayes.records.unit_folder import read_unit
 
-    unit = without_wild(read_unit(path))
+    unit = without_wild(unit)
     checked = check_unit(unit, k)
     if not checked["may_infer"] and not force:
-        raise BadInput(path, "data fit for inference (--force goes on regardless)", checked["reason"])
-    ready = ReadyUnit(unit, checked, not checked["may_infer"])
-    repeat_findings(unit.name, ready.stamp({}))
+        expected = "data fit for inference (--force, in Python force=True, goes on regardless)"
+        raise BadInput(where or unit.name, expected, checked["reason"])
+    return ReadyUnit(unit, checked, not checked["may_infer"])
+
+
+def ready_unit(path: Path, k: float = 0.03, force: bool = False) -> ReadyUnit:
+    """Read and check a unit and repeat its warnings; BadInput as :func:`judged` says."""
+    from backdrive_bayes.records.unit_folder import read_unit
+
+    ready = judged(read_unit(path), k, force, path)
+    repeat_findings(ready.unit.name, {"findings": ready.checked["findings"], "forced": ready.forced})
     return ready
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from backdrive_bayes.commands.door import ready_unit
 from backdrive_bayes.commands.output import default_out, require_out, say, write_folder
 from backdrive_bayes.commands.progress import progress
-from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, fit_unit, keep_fit, keep_run, ready_unit, retire
+from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, fit_unit, keep_fit, keep_run, retire
+from backdrive_bayes.commands.stages import FIT_KEPT
+from backdrive_bayes.commands.tables import show_indicators, show_loads
+from backdrive_bayes.decisions.outcome import line
 
-ARCMIN = 10800.0 / 3.141592653589793
 HELP = "infer a unit's parameters and indicators, with credible intervals"
 
 
@@ -35,55 +38,23 @@ def run(args) -> int:
     unit = ready.unit
     out = args.out or default_out(unit.name, "fit")
     require_out(out)
-    with progress() as note:
+    with progress(*FIT_KEPT) as note:
         posterior, result = fit_unit(unit, options, note)
         ready.stamp(result)["notes"] += ready.lines
         with write_folder(out) as folder:
             keep_fit(posterior, result, folder, not args.no_figures, note)
             keep_run(folder, "fit", began)
-    retire(out, result["data_sha256"])
+            retire(out, result)
     _summarise(result, out)
-    return 0 if posterior.converged else 4
+    return result["outcome"]["exit_code"]
 
 
 def _summarise(result: dict, out: Path) -> None:
     convergence = result["convergence"]
-    if convergence["converged"]:
-        say(f"{result['unit']}: converged; median [{result['level']:.0%} interval]")
-    else:
+    say(f"{result['unit']}: {line(result['outcome'])}")
+    if result["outcome"]["exit_code"]:
         least = min(convergence["min_bulk_ess"], convergence["min_tail_ess"])
-        say(f"{result['unit']}: INCONCLUSIVE, {convergence['advice']}")
-        for text in convergence["contradictions"][1:]:
-            say(f"  and {text}")
-        say(f"  R-hat {convergence['max_rhat']:.3f}, ESS {least:.0f} ({convergence['worst']}); provisional median [interval]:")
-    for record in result["records"]:
-        say(f"  {record['file']}: " + ", ".join(_shown(record["indicators"], result["k"])))
-    for row in result.get("loads", []):
-        say(f"  {_load_text(row)}")
+        say(f"R-hat {convergence['max_rhat']:.3f}, ESS {least:.0f} ({convergence['worst']})")
+    show_indicators(result)
+    show_loads(result)
     say(f"written to {out}")
-
-
-def _shown(indicators: dict, k: float):
-    names = (
-        ("lost_motion_rad", f"δ({k:g}T_r)", ARCMIN, "′"),
-        ("zero_torque_width_rad", "w(0)", ARCMIN, "′"),
-        ("peak_angle_rad", "peak", ARCMIN, "′"),
-        ("loop_area_J", "S", 1e3, " mJ"),
-        ("dissipation_ratio", "u", 1.0, ""),
-    )
-    for key, symbol, factor, unit in names:
-        value = indicators[key]
-        if value is not None:
-            yield f"{symbol} = {_scaled(value, factor, unit)}"
-
-
-def _load_text(row: dict) -> str:
-    predicted = f" ({' and '.join(row['predicted'])} not measured)".replace("_", " ") if row["predicted"] else ""
-    turned, absorbed = _scaled(row["theta_L_rad"], ARCMIN, "′"), _scaled(row["W_L_J"], 1e3, " mJ")
-    arrives = f"load {row['load_Nm']:.4g} N·m at {row['loading_rate_Nm_per_s']:.3g} N·m/s"
-    return f"{arrives}: θ_L = {turned}, W_L = {absorbed}{predicted}"
-
-
-def _scaled(value: dict, factor: float, unit: str) -> str:
-    median, lo, hi = (value[part] * factor for part in ("median", "lo", "hi"))
-    return f"{median:.4g} [{lo:.4g}, {hi:.4g}]{unit}"

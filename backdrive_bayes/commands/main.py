@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import importlib
-import signal
 import sys
 from pathlib import Path
 
@@ -37,16 +36,23 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command and return its exit code: 0 done, 2 bad input or usage, others as the verb says."""
+    """Run one command and return its exit code: 0 done, 2 bad input or usage, others as the verb says.
+
+    Without ``argv`` it is the process's own command line, and Ctrl-C and SIGTERM end the process.
+    """
+    from backdrive_bayes.commands.stopping import stoppable
+
+    with stoppable() if argv is None else contextlib.nullcontext():
+        return _run(sys.argv[1:] if argv is None else list(argv))
+
+
+def _run(argv: list[str]) -> int:
     from backdrive_bayes.commands.output import complain
 
-    argv = sys.argv[1:] if argv is None else list(argv)
     args = None
     try:
         args = _parser(argv).parse_args(argv)
         _refuse_nul(args)
-        with contextlib.suppress(ValueError):  # signals are for the main thread
-            signal.signal(signal.SIGTERM, _stop)
         return args.run(args)
     except SystemExit as done:  # --help and --version
         return done.code if isinstance(done.code, int) else 0
@@ -97,11 +103,6 @@ def _parser(argv: list[str]) -> argparse.ArgumentParser:
         own.add_argument("--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers (default 0)")
         own.set_defaults(run=module.run)
     return parser
-
-
-def _stop(number, frame):
-    # Leaves by way of everything that cleans up behind itself.
-    raise SystemExit(128 + number)
 
 
 class _Version(argparse.Action):

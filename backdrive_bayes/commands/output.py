@@ -7,7 +7,6 @@ import json
 import math
 import os
 import re
-import secrets
 import shutil
 import sys
 from collections.abc import Iterator
@@ -15,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from backdrive_bayes.commands.parts import part
+from backdrive_bayes.commands.stopping import unstopped
 from backdrive_bayes.errors import BadInput
 
 LONGEST_LINE = 2000
@@ -47,34 +48,32 @@ def default_out(unit_name: str, verb: str) -> Path:
 def write_folder(out: Path | str) -> Iterator[Path]:
     """Yield a temporary folder that becomes ``out`` at the end; nothing stays behind on failure.
 
-    Where ``out`` exists its files of the same names are replaced one by one and all others are left alone.
-    Raises BadInput when ``out`` or a name in it is in the way.
+    Where ``out`` exists its files of the same names are replaced one by one and all others are left alone; what a killed
+    process left beside it is taken away. Raises BadInput when ``out`` or a name in it is in the way.
     """
+    require_out(out)
     out = Path(os.path.abspath(out))
-    made = _make_parents(out)
-    temporary = out.parent / f".{out.name[:80]}.{secrets.token_hex(4)}.part"
-    try:
+    with part(out) as temporary:
         temporary.mkdir()
         yield temporary
-        _move(temporary, out)
-    except BaseException:  # an interrupt too must leave nothing behind; it is raised again
-        shutil.rmtree(temporary, ignore_errors=True)
-        for folder in made:
-            with contextlib.suppress(OSError):
-                folder.rmdir()
-        raise
+        with unstopped():
+            _move(temporary, out)
+
+
+@contextlib.contextmanager
+def write_file(path: Path | str) -> Iterator[Path]:
+    """Yield the name of a temporary file that becomes ``path`` at the end, in one step."""
+    path = Path(os.path.abspath(path))
+    with part(path) as temporary:
+        yield temporary
+        os.replace(temporary, path)
 
 
 def write_json(path: Path | str, obj) -> None:
     """Write ``obj`` as JSON in one step; numpy values become plain ones, NaN and infinities null."""
-    path = Path(path)
     text = json.dumps(_plain(obj), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
+    with write_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def require_out(out: Path | str) -> None:
@@ -85,13 +84,6 @@ def require_out(out: Path | str) -> None:
     with_file = next((folder for folder in out.parents if folder.exists()), None)
     if with_file is not None and not with_file.is_dir():
         raise BadInput(out, "a folder to write into", f"the file '{with_file}' in its path")
-
-
-def _make_parents(out: Path) -> list[Path]:
-    require_out(out)
-    missing = [folder for folder in out.parents if not folder.exists()]
-    out.parent.mkdir(parents=True, exist_ok=True)
-    return missing
 
 
 def _move(temporary: Path, out: Path) -> None:

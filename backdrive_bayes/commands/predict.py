@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
-from backdrive_bayes.commands.output import say, write_folder
+from backdrive_bayes.commands.output import say, write_folder, write_json
+from backdrive_bayes.commands.results import stamped
+from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.results import PREDICTION, SEAL, read_group
 
 HELP = "angle with 90 % interval for a torque history, from a posterior"
 RAD_TO_ARCMIN = 10800.0 / 3.141592653589793
@@ -24,7 +28,7 @@ def add_arguments(parser) -> None:
 
 
 def run(args) -> int:
-    """Write prediction.csv (and draws.csv)."""
+    """Write prediction.csv, what it rests on as prediction.json, and draws.csv where asked for; 0 done."""
     import numpy as np
 
     from backdrive_bayes.engine.posterior_read import read_posterior
@@ -51,9 +55,23 @@ def run(args) -> int:
             some = curves[np.linspace(0, len(curves) - 1, args.draws).astype(int)]
             names = ",".join(["time_s", "torque_Nm", *(f"angle_{i}_arcmin" for i in range(args.draws))])
             _write(folder / "draws.csv", names, time, measured, nodes(torque), some)
-    half = float(np.max(bounds[2] - bounds[1]) / 2)
-    say(f"written to {out}/prediction.csv: {time.size} points, half-width at most {half:.3g}′")
-    return 0
+        half = float(np.max(bounds[2] - bounds[1]) / 2)
+        result = _sidecar(args, posterior, f"{time.size} points, half-width at most {half:.3g}′")
+        write_json(folder / "prediction.json", result)
+    say(f"{result['unit']}: {line(result['outcome'])}")
+    say(f"written to {out}/prediction.csv")
+    return result["outcome"]["exit_code"]
+
+
+def _sidecar(args, posterior, told: str) -> dict:
+    """What the prediction rests on: the posterior, the torque history and the options."""
+    with args.path.open("rb") as file:
+        history = {"file": args.path.name, "sha256": hashlib.file_digest(file, "sha256").hexdigest()}
+    own = {"unit": posterior.unit_name, "data_sha256": list(posterior.data_hashes)}
+    digest = read_group(args.posterior, "sample_stats").attrs[SEAL]
+    result = {"schema": PREDICTION, "reason": told, "history": history, "posterior_sha256": digest}
+    options = {"start": args.start, "draws": args.draws, "extrapolate": args.extrapolate}
+    return stamped(result, own, posterior.seed, options)
 
 
 def _write(path, header, time, torque, at, curves) -> None:

@@ -29,14 +29,16 @@ def add_arguments(parser) -> None:
 
 def run(args) -> int:
     """Write report.pdf into the folder of ``-o`` or the first result folder, or the file of ``-o``; 0 done."""
-    from backdrive_bayes.commands.output import say, write_folder
+    from backdrive_bayes.commands.output import say, write_file, write_folder
     from backdrive_bayes.report.report import write_report
 
     out = args.out or args.results[0]
     given = getattr(args, "template", None)
     template = read_template(given) if given else None
     if out.suffix.lower() == ".pdf" and not out.is_dir():
-        say(f"report written to {write_report(args.results, out, template)}")
+        with write_file(out) as temporary:
+            write_report(args.results, temporary, template)
+        say(f"report written to {out}")
         return 0
     with write_folder(out) as folder:
         write_report(args.results, folder / NAME, template)

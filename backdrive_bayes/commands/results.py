@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import platform
@@ -13,10 +12,13 @@ from pathlib import Path
 from backdrive_bayes.commands.door import add_force_argument, ready_unit
 from backdrive_bayes.commands.output import say, write_json
 from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.results import CHECK, DIAGNOSIS, read_result, require_same_data
 
 BASELINE = "geometric,elastic,friction"
 __all__ = ["FitOptions", "add_fit_arguments", "diagnose_unit", "draw_figures", "fit_unit", "is_result", "keep_fit", "ready_unit"]
 FIT_FILES = ("posterior.nc", "indicators.json")
+DIAGNOSIS_FIGURES = ("diagnosis", "gap-", "closed-fraction", "parameter-shift")
+"""How the names of a diagnosis's figures begin."""
 
 
 @dataclass(frozen=True)
@@ -90,27 +92,34 @@ def fit_unit(unit, options: FitOptions, note=lambda text: None, posterior=None):
         record["least_squares"] = least_squares_json(own, unit.rated_torque_nm, options.k)
     result["identity"] = dict(unit.identity)
     result["notes"] = [*unit.notes, *(f"{r.name}: {note}" for r in unit.records for note in r.notes)]
-    return posterior, stamped(result, posterior.data_hashes, options.seed, options.to_json())
+    return posterior, stamped(result, origin(unit), options.seed, options.to_json())
 
 
-def stamped(result: dict, data_sha256, seed: int, options: dict) -> dict:
-    """The result with what it rests on: hashes of the data, version, seed and options."""
+def origin(unit) -> dict:
+    """Which data a result of a unit rests on."""
+    return {"unit": unit.name, "data_sha256": list(unit.data_sha256), "unit_sha256": unit.file_sha256}
+
+
+def stamped(result: dict, origin: dict, seed: int, options: dict) -> dict:
+    """The result with what it rests on (data, version, seed, options) and how it came out."""
     from importlib.metadata import version
 
+    from backdrive_bayes.decisions.outcome import outcome_of
     from backdrive_bayes.engine.posterior_file import software
 
-    result["data_sha256"] = list(data_sha256)
-    result["version"], result["versions"] = version("backdrive-bayes"), software()
-    result["seed"], result["options"] = seed, options
+    result |= origin | {"version": version("backdrive-bayes"), "versions": software(), "seed": seed, "options": options}
+    result["outcome"] = outcome_of(result).to_json()
     return result
 
 
 def stamped_by(result: dict, evidences, seed: int | None = None, **options) -> dict:
-    """The same for a result that rests on fits; without a seed of its own it has that of the first."""
+    """The same for a result that rests on fits of one unit or several; without a seed of its own it has that of the first."""
     about = evidences[0].about
-    hashes = [h for e in evidences for h in e.about.get("data_sha256", [])]
     own = {key: about[key] for key in ("k", "level")} | {"baseline": about["model"]["modules"]}
-    return stamped(result, hashes, about.get("seed", 0) if seed is None else seed, own | options)
+    rests = {key: about[key] for key in ("data_sha256", "unit_sha256")}
+    if len(evidences) > 1:
+        rests = {"data_sha256": [h for e in evidences for h in e.about["data_sha256"]]}
+    return stamped(result, rests, about["seed"] if seed is None else seed, own | options)
 
 
 def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: bool = True):
@@ -118,21 +127,20 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
     from backdrive_bayes.gap.diagnose import diagnose
 
     found = diagnose(unit, baseline=options.baseline, seed=options.seed, k=options.k, progress=note)
-    hashes = tuple(filter(None, [unit.data_hash]))
     if not sample:
-        return stamped(found.json, hashes, options.seed, options.to_json()), None
+        return stamped(found.json, origin(unit), options.seed, options.to_json()), None
     sampled = fit_unit(unit, options, note, found.posterior)
     found.json["convergence"] = sampled[1]["convergence"]
-    return stamped(found.json, sampled[0].data_hashes, options.seed, options.to_json()), sampled
+    return stamped(found.json, origin(unit), options.seed, options.to_json()), sampled
 
 
 def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=lambda text: None) -> None:
-    """Write indicators.json, posterior.nc and figures into ``folder``."""
+    """Write posterior.nc, indicators.json with its digest, and figures into ``folder``."""
     from backdrive_bayes.engine.posterior_file import write_posterior
 
     note("saving the posterior")
-    write_json(folder / "indicators.json", result)
-    write_posterior(posterior, folder / "posterior.nc", result.get("options"))
+    digest = write_posterior(posterior, folder / "posterior.nc", result["options"])
+    write_json(folder / "indicators.json", result | {"posterior_sha256": digest})
     if figures:
         note("figures")
         draw_figures("save_figures", folder)
@@ -145,18 +153,35 @@ def keep_run(folder: Path, verb: str, began_s: float) -> None:
     write_json(folder / "run.json", {"schema": "backdrive-bayes/run/1", "verb": verb, "seconds": seconds, "machine": facts})
 
 
-def retire(out: Path, data_sha256) -> None:
-    """Take away what an older fit left in ``out``: its verdict, and a diagnosis of other data."""
+def retire(out: Path, result: dict) -> None:
+    """Take away what rests on an older fit in ``out``: its verdict and figures, a check and a diagnosis of other data.
+
+    ``result`` is the indicators object of the fit that is about to come.
+    """
     (out / "verdict.json").unlink(missing_ok=True)
-    path = out / "diagnosis.json"
+    kept = [_keep_own(out / name, schema, result) for name, schema in (("diagnosis.json", DIAGNOSIS), ("check.json", CHECK))]
+    for figure in (out / "figures").glob("*.*g"):
+        if not (kept[0] and figure.name.startswith(DIAGNOSIS_FIGURES)) and figure.suffix in (".svg", ".png"):
+            figure.unlink()
+
+
+def _keep_own(path: Path, schema: str, about: dict) -> bool:
+    """Whether a result file is there and of the same data; any other is taken away."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8")).get("data_sha256")
-    except FileNotFoundError:
-        return
-    except (OSError, ValueError, AttributeError):
-        found = None
-    if found != list(data_sha256):
-        path.unlink()
+        require_same_data(path, read_result(path, schema), about)
+    except BadInput:
+        path.unlink(missing_ok=True)
+        return False
+    return True
+
+
+def refuse_company(out: Path, result: dict) -> None:
+    """BadInput where ``out`` holds a fit of other data than a result that is to lie beside it."""
+    from backdrive_bayes.results import INDICATORS
+
+    path = out / "indicators.json"
+    if path.is_file():
+        require_same_data(path, read_result(path, INDICATORS), result)
 
 
 def draw_figures(function: str, folder: Path) -> None:

@@ -16,7 +16,14 @@ from backdrive_bayes.engine.posterior_read import read_posterior
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import IndicatorDraws
 from backdrive_bayes.indicators.same_loop import same_amplitude
-from backdrive_bayes.results import DIAGNOSIS, INDICATORS, read_result
+from backdrive_bayes.results import (
+    DIAGNOSIS,
+    INDICATORS,
+    read_group,
+    read_result,
+    require_own_posterior,
+    require_same_data,
+)
 
 
 class Draws(Protocol):
@@ -60,17 +67,17 @@ class Evidence:
 
     @classmethod
     def read(cls, folder: Path) -> Evidence:
-        """From a result folder of a fit; BadInput where it is none or its files are not of the same data."""
+        """From a result folder of a fit; BadInput where it is none or its files do not belong together."""
         folder = Path(folder)
-        about = read_result(folder / "indicators.json", INDICATORS)
-        if not (folder / "posterior.nc").is_file():
+        about, path = read_result(folder / "indicators.json", INDICATORS), folder / "posterior.nc"
+        if not path.is_file():
             raise BadInput(folder, "a result folder with posterior.nc", "none")
-        posterior = read_posterior(folder / "posterior.nc")
+        posterior = read_posterior(path)
+        require_own_posterior(path, read_group(path, "sample_stats").attrs, about)
         path = folder / "diagnosis.json"
         diagnosis = read_result(path, DIAGNOSIS) if path.is_file() else None
-        _require_same_data(folder / "posterior.nc", about, {"data_sha256": list(posterior.data_hashes)})
         if diagnosis is not None:
-            _require_same_data(path, about, diagnosis)
+            require_same_data(path, diagnosis, about)
         return cls(about, IndicatorDraws(posterior, _k(folder, about)), diagnosis, str(folder))
 
     @classmethod
@@ -152,11 +159,3 @@ def _k(folder, about) -> float:
     if isinstance(k, bool) or not isinstance(k, int | float) or not 0 < k < 1:
         raise BadInput(folder / "indicators.json, key k", "a share between 0 and 1", repr(k)[:40])
     return float(k)
-
-
-def _require_same_data(path, about, other) -> None:
-    """BadInput where two results of a folder name different data; one that names none is let through."""
-    hashes = [r.get("data_sha256") for r in (about, other)]
-    if all(hashes) and hashes[0] != hashes[1]:
-        shown = [", ".join(str(x)[:12] for x in ([h] if isinstance(h, str) else h)) for h in hashes]
-        raise BadInput(path, f"data with SHA-256 {shown[0]}, as indicators.json has", shown[1])

@@ -76,6 +76,9 @@ def _given(evidences, probabilities, diagnosed):
         raise BadInput("models", "one probability a model, between 0 and 1 and at most 1 in all", shown)
     if len({e.name for e in evidences}) > 1:
         raise BadInput("models", "several models of one unit", " and ".join(sorted({e.name for e in evidences})))
+    for other in evidences[1:]:
+        if other.about["data_sha256"] != evidences[0].about["data_sha256"]:
+            raise BadInput("models", f"several models of the same records of {evidences[0].name}", "fits of different data")
     left = max(0.0, 1.0 - sum(probabilities))
     models = tuple(Model(e, p) for e, p in zip(evidences, probabilities, strict=True))
     return Structure(models, {"models not given": left} if left > SMALL else {}, diagnosed)

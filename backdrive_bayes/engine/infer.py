@@ -53,7 +53,7 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
     reduced, names = linear.reduced, linear.design.names
     return Posterior(
         unit_name=reduced.unit.name,
-        data_hashes=tuple(filter(None, [reduced.unit.data_hash])),
+        data_hashes=reduced.unit.data_sha256,
         rated_torque_nm=reduced.unit.rated_torque_nm,
         reducer=linear.reducer,
         distortion=linear.distortion,

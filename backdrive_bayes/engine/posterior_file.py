@@ -12,21 +12,23 @@ import numpy as np
 
 from backdrive_bayes.engine.parameters import posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
-from backdrive_bayes.engine.posterior_read import ARRAYS, BLOCKS, LEGS, digest_of
+from backdrive_bayes.engine.posterior_read import ARRAYS, BLOCKS, LEGS
 from backdrive_bayes.engine.predictive import block_offsets, replicates
-from backdrive_bayes.results import POSTERIOR
+from backdrive_bayes.results import POSTERIOR, SEAL, digest_of
 
 
-def write_posterior(posterior: Posterior, path: Path, options: dict | None = None) -> None:
+def write_posterior(posterior: Posterior, path: Path, options: dict | None = None) -> str:
     """Write the groups posterior, unconstrained_posterior (the weights), sample_stats, posterior_predictive, observed_data and
-    constant_data; angles in rad, torques in N·m. ``options`` are those of the fit, kept as an attribute.
+    constant_data; angles in rad, torques in N·m. ``options`` are those of the fit, kept as an attribute. Returns the seal, a
+    SHA-256 of everything in the file.
     """
     groups = posterior_groups(posterior, options or {})
     seal = digest_of(groups)
     for mode, (name, dataset) in zip("w" + "a" * (len(groups) - 1), groups.items(), strict=True):
         encoding = {v: {"zlib": True, "complevel": 1} for v in dataset.data_vars if dataset[v].dtype.kind == "f"}
-        sealed = dataset.assign_attrs(content_sha256=seal)
+        sealed = dataset.assign_attrs({SEAL: seal})
         sealed.to_netcdf(path, mode=mode, group=name, engine="h5netcdf", encoding=encoding)
+    return seal
 
 
 def as_saved(posterior: Posterior) -> Posterior:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
-
-import numpy as np
 
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
@@ -16,43 +13,22 @@ from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.mechanics.registry import BENCH, UNKNOWN, all_effects
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
-from backdrive_bayes.results import read_group
+from backdrive_bayes.results import read_groups
 
-GROUPS = ("posterior", "unconstrained_posterior", "sample_stats", "posterior_predictive", "observed_data", "constant_data")
 BLOCKS = ("torque_nm", "torque_variance_nm2", "begin_s", "end_s", "count", "leg", "bend_rad", "torque_trend_nm2")
 ARRAYS = ("predicted_rad", "residual", "noise_sd_rad")
 LEGS = "leg_record"
-SEAL = "content_sha256"
 
 
 def read_posterior(path: Path | str) -> Posterior:
     """The posterior that ``write_posterior`` saved; BadInput where the file is none, lacks something or was changed."""
     path = Path(path)
-    groups = {name: read_group(path, name) for name in GROUPS}
-    seals = {g.attrs.get(SEAL) for g in groups.values()}
-    try:
-        whole = seals == {digest_of(groups)}
-    except (TypeError, ValueError):
-        whole = False
-    if not whole:
-        raise BadInput(path, "the file as it was written", "changed or missing bytes (fit the unit again)")
+    groups = read_groups(path)
     try:
         return _rebuilt(groups)
     except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
         detail = str(error).strip("'\"")[:60]
         raise BadInput(path, "a posterior of this version with all its parts", f"{type(error).__name__} {detail}") from None
-
-
-def digest_of(groups: dict) -> str:
-    """SHA-256 of the names, values and attributes of datasets by group."""
-    seal = hashlib.sha256()
-    for name in sorted(groups):
-        attributes = {k: str(v) for k, v in groups[name].attrs.items() if k != SEAL}
-        seal.update(json.dumps([name, attributes], sort_keys=True).encode())
-        for variable in sorted(map(str, groups[name].data_vars)):
-            values = np.ascontiguousarray(groups[name][variable].values)
-            seal.update(f"{variable}{values.shape}{values.dtype.kind}{values.dtype.itemsize}".encode() + values.tobytes())
-    return seal.hexdigest()
 
 
 def _rebuilt(groups) -> Posterior:

@@ -40,7 +40,7 @@ class Diagnosed:
         """Read a result folder of ``diagnose``; BadInput where the file is missing, broken or incomplete."""
         path = Path(folder) / FILE
         result = read_result(path, DIAGNOSIS)
-        for key in ("unit", "records", "which", "answer"):
+        for key in ("unit", "records", "which", "answer", "outcome"):
             if key not in result:
                 raise BadInput(path, f"key '{key}'", "no such key")
         return cls(result)
@@ -67,12 +67,9 @@ class Diagnosed:
 
     @property
     def inconclusive(self) -> str:
-        """Why there is no answer; empty where there is one. Sampling that has not converged gives none."""
-        reason = self.result.get("inconclusive") or ""
-        convergence = self.result.get("convergence")
-        if not reason and convergence and not convergence["converged"]:
-            reason = convergence.get("advice") or "the sampling has not converged"
-        return reason
+        """Why there is no answer; empty where there is one."""
+        outcome = self.result["outcome"]
+        return outcome["reason"] if outcome["exit_code"] else ""
 
     @property
     def effects(self) -> list[str]:

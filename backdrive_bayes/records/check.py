@@ -17,10 +17,10 @@ from backdrive_bayes.records.plausible import why_unfinished
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.shape import closure, cycle_count, extremes, loading_rate
 from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy
+from backdrive_bayes.results import CHECK
 
 LOST_MOTION_SHARE = 0.03
 """k, the share of T_r at which lost motion is taken unless somebody asks for another."""
-SCHEMA = "backdrive-bayes/check/1"
 
 
 def check_unit(unit: Unit, k: float = LOST_MOTION_SHARE) -> dict:
@@ -39,12 +39,11 @@ def check_unit(unit: Unit, k: float = LOST_MOTION_SHARE) -> dict:
         else f"{warnings} warning{'s'[: warnings != 1]} to keep in mind"
     )
     return {
-        "schema": SCHEMA,
+        "schema": CHECK,
         "unit": unit.name,
         "rated_torque_Nm": unit.rated_torque_nm,
         "reduction_ratio": unit.reduction_ratio,
         "identity": dict(unit.identity),
-        "data_hash": unit.data_hash,
         "records": records,
         "findings": [finding.to_json() for finding in findings],
         "messages": [finding.message() for finding in findings],

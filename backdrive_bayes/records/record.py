@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +17,7 @@ class Record:
     time rises strictly. ``loading_rate_nm_per_s`` and ``amplitude_nm`` are what the unit file declares (None where it
     is silent). ``notes`` says in words what the reader did to the data (re-timing, dropped rows and so on). ``columns`` maps
     'time', 'torque' and 'angle' to the spelling under which the unit file finds them, a leading minus where a sign is turned.
+    ``file_sha256`` is that of the file's bytes, empty for a record that was made in memory.
     """
 
     name: str
@@ -25,6 +28,17 @@ class Record:
     amplitude_nm: float | None = None
     notes: tuple[str, ...] = ()
     columns: dict[str, str] = field(default_factory=dict)
+    file_sha256: str = ""
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the file's bytes, or of the samples' where there is no file."""
+        if self.file_sha256:
+            return self.file_sha256
+        digest = hashlib.sha256()
+        for values in (self.time_s, self.torque_nm, self.angle_rad):
+            digest.update(np.ascontiguousarray(values, float).tobytes())
+        return digest.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +46,7 @@ class Unit:
     """A reducer and its records.
 
     ``rated_torque_nm`` is T_r; ``identity`` holds the free text of the unit file (material, serial, test date, …) as
-    data, never as markup; ``data_hash`` is the SHA-256 of the files' bytes.
+    data, never as markup; ``file_sha256`` is the SHA-256 of the unit file's bytes, empty where there is none.
     """
 
     name: str
@@ -41,4 +55,9 @@ class Unit:
     reduction_ratio: float | None = None
     identity: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    data_hash: str = ""
+    file_sha256: str = ""
+
+    @property
+    def data_sha256(self) -> tuple[str, ...]:
+        """SHA-256 of every record in order."""
+        return tuple(r.sha256 for r in self.records)

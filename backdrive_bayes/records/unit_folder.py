@@ -49,7 +49,7 @@ def _read_folder(folder: Path) -> Unit:
         reduction_ratio=entry.reduction_ratio,
         identity=entry.identity,
         notes=entry.notes,
-        data_hash=_hash([folder / FILE_NAME, *(record.path for record in entry.records)]),
+        file_sha256=_sha256(folder / FILE_NAME),
     )
 
 
@@ -60,9 +60,7 @@ def _read_bare(path: Path) -> Unit:
     record = _read_record(RecordEntry(path, path.name), None)
     rated = float(np.abs(record.torque_nm[~find_wild(record.torque_nm, SPOILING_SHARE)]).max())
     note = f"no rated torque given: T_r taken as the largest torque, {rated:.4g} N·m"
-    return Unit(
-        path.name[: -len(suffix)] or path.name, rated, (record,), notes=(note,), data_hash=_hash([path])
-    )
+    return Unit(path.name[: -len(suffix)] or path.name, rated, (record,), notes=(note,))
 
 
 def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
@@ -88,6 +86,7 @@ def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
         entry.amplitude_nm,
         (*columns.notes, *(quantity.note for quantity in quantities if quantity.note), *clock, *wraps),
         dict(zip(_KINDS, map(spelling, headers, quantities), strict=True)),
+        _sha256(entry.path),
     )
     check_plausible(record, rated_torque_nm, str(entry.path))
     return record
@@ -104,10 +103,6 @@ def _check_length(path: Path, columns: Columns) -> None:
         raise BadInput(path, f"a record of {FEWEST_READ} samples or more", f"{count} sample{'s'[: count != 1]}")
 
 
-def _hash(paths: list[Path]) -> str:
-    digest = hashlib.sha256()
-    for path in paths:
-        with path.open("rb") as file:
-            while chunk := file.read(1 << 20):
-                digest.update(chunk)
-    return digest.hexdigest()
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

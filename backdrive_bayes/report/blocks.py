@@ -88,6 +88,14 @@ class Picture(Block):
 
 
 @dataclass(frozen=True)
+class Links(Block):
+    """Rows of a name, the file that it leads to (a path beside the report), and words."""
+
+    kind = "links"
+    rows: list[tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
 class Signature(Block):
     """Lines to be filled in by hand."""
 

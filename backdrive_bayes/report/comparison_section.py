@@ -55,8 +55,8 @@ def _outcome(result):
     rows = [r for p in result["pairs"] for c in p["conditions"] for r in c["indicators"].values()]
     clear = sum(r["verdict"] in ("greater", "less") for r in rows)
     text = f"{clear} of {len(rows)} differences are clear"
-    if not result["converged"]:
-        text = f"INCONCLUSIVE in part; {text}" if len(_usable(result)) > 1 else "INCONCLUSIVE"
+    if result["outcome"]["exit_code"]:
+        text = f"{result['outcome']['word'].upper()}; {text}"
     found = (result["claims"] or {}).get("claims", [])
     counts = [f"{sum(c['verdict'] == v for c in found)} {v}" for v in ("holds", "does not hold", "open") if found]
     return f"{text}; claims: {', '.join(counts)}" if found else text
@@ -64,16 +64,11 @@ def _outcome(result):
 
 def _banner(result):
     rows = [r for p in result["pairs"] for c in p["conditions"] for r in c["indicators"].values()]
-    lacking = [name for name in result["names"] if name not in _usable(result)]
-    if lacking and len(result["names"]) - len(lacking) < 2:
-        text = f"Not converged: {free(', '.join(lacking), 200)}. Do not use these differences."
-        return Banner("bad", "INCONCLUSIVE: the sampling has not converged", text)
-    if lacking:
-        text = (
-            f"Not converged: {free(', '.join(lacking), 200)}. Every comparison and claim with them is inconclusive and not to be "
-            "used; those of the other units stand."
-        )
-        return Banner("caution", "INCONCLUSIVE IN PART: the sampling of some units has not converged", text)
+    outcome = result["outcome"]
+    if outcome["exit_code"]:
+        reason = free(outcome["reason"], 400).rstrip(".")
+        tone = "caution" if len(_usable(result)) > 1 else "bad"
+        return Banner(tone, outcome["word"].upper(), f"{reason[:1].upper()}{reason[1:]}.")
     clear = sum(r["verdict"] in ("greater", "less") for r in rows)
     same = sum(r["verdict"] == "equivalent" for r in rows)
     text = (

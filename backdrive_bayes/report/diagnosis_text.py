@@ -27,11 +27,10 @@ TERMS = [
 
 def verdict(saved: Diagnosed) -> tuple[str, str, str]:
     """Tone, title and text of the banner."""
-    outcome = saved.result["outcome"]
-    if outcome["exit_code"]:
-        reason = free(outcome["reason"], 400).rstrip(".")
+    if saved.inconclusive:
+        reason = free(saved.inconclusive, 400).rstrip(".")
         text = Free(f"Reason: {reason}. Do not name a cause from this result.")
-        return "bad", f"{outcome['word'].upper()}: no effect is named", text
+        return "bad", f"{saved.result['outcome']['word'].upper()}: no effect is named", text
     where = free(saved.summary, 400)
     if not saved.effects:
         return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))

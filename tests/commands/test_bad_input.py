@@ -14,7 +14,9 @@ from conftest import answer, ramps, write_csv
 from backdrive_bayes.commands.door import collected, ready_unit
 from backdrive_bayes.commands.main import main
 from backdrive_bayes.commands.output import default_out, write_folder, write_json
+from backdrive_bayes.decisions.outcome import FORCED
 from backdrive_bayes.records.readers import limits
+from backdrive_bayes.results import INDICATORS
 
 TIME, TORQUE = ramps(noise=0.002)
 ANGLE = answer(TORQUE) * 10800 / np.pi
@@ -277,13 +279,17 @@ def test_every_verb_refuses_unfit_data(verb, unit_folder, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+FITTED = {"schema": INDICATORS, "convergence": {"converged": True}}
+
+
 def test_force_goes_on_and_says_so(unit_folder, capsys):
     rewrite(unit_folder, angle=-ANGLE)
     ready = ready_unit(unit_folder, force=True)
     said = capsys.readouterr().out
     assert "forced: the data are unfit" in said and "error: a.csv: the angle falls" in said
-    result = ready.stamp({"unit": "u"})
+    result = ready.stamp(FITTED | {"unit": "u"})
     assert result["forced"] is True and result["findings"][0]["code"] == "angle_inverted"
+    assert (result["outcome"]["word"], result["outcome"]["caveat"]) == ("converged", FORCED)
     assert collected([result])["forced"] and collected([result])["findings"][0]["unit"] == "u"
 
 
@@ -292,7 +298,7 @@ def test_warnings_are_repeated_and_kept(unit_folder, capsys):
     ready = ready_unit(unit_folder)
     said = capsys.readouterr().out
     assert "warning: the largest torque tested" in said and "lost motion is not defined" in said
-    assert not ready.stamp({})["forced"]
+    assert not ready.stamp(dict(FITTED))["forced"]
     assert "lost motion is not defined" not in str(ready_unit(unit_folder, k=0.005).lines)
 
 

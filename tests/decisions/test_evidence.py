@@ -110,10 +110,55 @@ def test_folders_that_are_none_are_one_clear_line(folder, tmp_path):
         Evidence.read(folder)
 
 
-@pytest.mark.parametrize("name", ["indicators.json", "diagnosis.json"])
-def test_files_of_other_data_are_refused(folder, tmp_path, name):
+def diagnosed(folder, **changes):
+    """Lay a diagnosis of the folder's data beside the fit, with some stamps changed."""
+    about = json.loads((folder / "indicators.json").read_text())
+    own = {key: about[key] for key in ("unit", "data_sha256", "unit_sha256", "version")}
+    (folder / "diagnosis.json").write_text(json.dumps(diagnosis() | own | changes))
+
+
+def test_a_diagnosis_of_the_same_data_is_taken(folder, tmp_path):
     folder = copied(folder, tmp_path)
-    other = json.loads((folder / "indicators.json").read_text()) if name == "indicators.json" else diagnosis()
-    (folder / name).write_text(json.dumps(other | {"data_sha256": ["f" * 64]}))
-    with pytest.raises(BadInput, match="expected data with SHA-256.*ffffffffffff|expected data with SHA-256 ffffffffffff"):
+    diagnosed(folder)
+    assert Evidence.read(folder).diagnosis["answer"] == {"effects": []}
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"unit": "other"}, "expected a result of unit u, as indicators.json has, found other"),
+        ({"data_sha256": ["f" * 64]}, "expected data with SHA-256 0123456789ab, .*found ffffffffffff"),
+        ({"data_sha256": None}, "expected data with SHA-256 0123456789ab, .*found none"),
+        ({"unit_sha256": "e" * 64}, "expected a unit file with SHA-256 none, .*found eeeeeeeeeeee"),
+        ({"version": "0.0.1"}, "expected a result of version .*found 0.0.1"),
+    ],
+)
+def test_a_diagnosis_of_anything_else_is_refused(folder, tmp_path, changes, expected):
+    folder = copied(folder, tmp_path)
+    diagnosed(folder, **changes)
+    with pytest.raises(BadInput, match=f"diagnosis.json: {expected}"):
+        Evidence.read(folder)
+
+
+def test_indicators_and_posterior_of_different_fits_are_refused(folder, tmp_path):
+    """Of the same data even: an older indicators.json, or a posterior of another seed."""
+    folder = copied(folder, tmp_path)
+    other = write_evidence(tmp_path / "other", loops=WITH_SMALL, seed=5)
+    shutil.copy(other / "posterior.nc", folder)
+    with pytest.raises(BadInput, match="posterior.nc: expected the posterior with SHA-256"):
+        Evidence.read(folder)
+    about = json.loads((other / "indicators.json").read_text()) | {"data_sha256": ["f" * 64]}
+    (folder / "indicators.json").write_text(json.dumps(about))
+    with pytest.raises(BadInput, match="posterior.nc: expected data with SHA-256 ffffffffffff, as indicators.json has"):
+        Evidence.read(folder)
+
+
+def test_a_posterior_with_a_changed_hash_is_refused(folder, tmp_path):
+    import h5py
+
+    folder = copied(folder, tmp_path)
+    with h5py.File(folder / "posterior.nc", "a") as file:
+        for group in file.values():
+            group.attrs["data_sha256"] = "f" * 64
+    with pytest.raises(BadInput, match="posterior.nc: expected the file as it was written"):
         Evidence.read(folder)

@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from support.made_up_diagnosis import diagnosis, interval, write_diagnosis
+from support.told import told
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.figures import catalogue
@@ -34,7 +35,7 @@ NOTHING = NO_GAP | {
 
 
 def saved(count=3, **changes):
-    return Diagnosed(diagnosis(count) | changes)
+    return Diagnosed(told(diagnosis(count) | changes))
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +115,7 @@ def test_the_map_holds_every_cell_and_hatches_the_doubtful_ones(figures):
 def test_amplitudes_that_differ_share_an_axis_of_shares():
     result = diagnosis()
     result["records"][1]["amplitude_Nm"] = 1.0
-    assert "torque / amplitude" in words_of(figures_of(Diagnosed(result))["gap-map"])
+    assert "torque / amplitude" in words_of(figures_of(Diagnosed(told(result)))["gap-map"])
 
 
 def test_closed_fractions_stand_beside_the_control(figures):
@@ -125,7 +126,7 @@ def test_closed_fractions_stand_beside_the_control(figures):
 def test_legs_left_out_of_a_single_record_are_named():
     result = diagnosis(1)
     result["shrink"]["records"] = [result["shrink"]["records"][0] | {"record": f"leg {i}"} for i in (2, 3)]
-    assert "leg 3" in words_of(figures_of(Diagnosed(result))["closed-fraction"])
+    assert "leg 3" in words_of(figures_of(Diagnosed(told(result)))["closed-fraction"])
 
 
 def test_the_shifted_median_stands_at_its_shift(figures):
@@ -138,13 +139,13 @@ def test_the_shifted_median_stands_at_its_shift(figures):
 def test_shifts_of_hundreds_of_deviations_stay_legible():
     result = diagnosis()
     result["parameter_shift"][0]["shift_sd"] = -800.0
-    assert "logarithmic" in words_of(figures_of(Diagnosed(result))["parameter-shift"])
+    assert "logarithmic" in words_of(figures_of(Diagnosed(told(result)))["parameter-shift"])
 
 
 def test_a_parameter_that_was_as_good_as_fixed_leaves_the_ticks_apart():
     result = diagnosis()
     result["parameter_shift"][0]["shift_sd"] = -4829870312410.8
-    figure = figures_of(Diagnosed(result))["parameter-shift"]
+    figure = figures_of(Diagnosed(told(result)))["parameter-shift"]
     axes = figure.axes[0]
     assert [t.get_text() for t in axes.get_xticklabels()] == ["−1000", "−100", "−10", "0", "10", "100", "1000"]
     assert "< −1000" in words_of(figure) and min(min(line.get_xdata()) for line in axes.lines) >= -1000
@@ -168,6 +169,7 @@ def test_an_inconclusive_result_names_nothing():
 
 def test_keys_that_are_absent_do_no_harm():
     bare = {k: v for k, v in diagnosis().items() if k in ("schema", "unit", "records", "which", "answer")}
+    bare["outcome"] = {"word": "diagnosed", "reason": "", "exit_code": 0, "caveat": ""}
     assert list(figures_of(Diagnosed(bare))) == ["diagnosis"]
 
 
@@ -185,7 +187,7 @@ def test_free_text_is_drawn_letter_by_letter(text):
     hostile["which"][0]["effect"] = text
     hostile["parameter_shift"][0]["parameter"] = text
     hostile["shrink"]["records"][0]["record"] = text
-    for figure in figures_of(Diagnosed(hostile)).values():
+    for figure in figures_of(Diagnosed(told(hostile))).values():
         boxes(figure)
     assert drawable("$x$ #a", 20) == "$x$ #a" and drawable("a\x00", 20) == r"a\u{0}"
 

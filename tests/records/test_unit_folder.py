@@ -101,8 +101,9 @@ def test_unit_file_is_read_whole(unit_folder):
     assert unit.identity == {"serial": "#7", "test_date": "2024-05-06"}
     assert "limits" in unit.notes[0]
     assert (unit.records[0].loading_rate_nm_per_s, unit.records[0].amplitude_nm) == (1.0, 1.0)
-    assert unit.data_hash == hashlib.sha256(text.encode() + (unit_folder / "a.csv").read_bytes()).hexdigest()
-    assert read_unit(toml).data_hash == unit.data_hash
+    digests = [hashlib.sha256(content).hexdigest() for content in (text.encode(), (unit_folder / "a.csv").read_bytes())]
+    assert [unit.file_sha256, *unit.data_sha256] == digests
+    assert read_unit(toml).data_sha256 == unit.data_sha256
 
 
 @given(

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pypdf
 import pytest
-from support.decided import evidence
+from support.decided import diagnosis, evidence
+from support.told import told
 from support_results import write_result
 
 from backdrive_bayes.commands.main import main
@@ -54,7 +55,8 @@ def template(folder, text=None, **logos):
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     folder = tmp_path_factory.mktemp("verdict")
-    write_json(folder / "verdict.json", assess([evidence("u")], Limits((Limit("peak_angle_rad", hi=1.0),))))
+    verdict = assess([evidence("u", diagnosis=diagnosis(none=0.99))], Limits((Limit("peak_angle_rad", hi=1.0),)))
+    write_json(folder / "verdict.json", told(verdict))
     return folder
 
 

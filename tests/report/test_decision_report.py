@@ -7,6 +7,7 @@ import re
 import pypdf
 import pytest
 from support.decided import diagnosis, evidence
+from support.told import told
 
 from backdrive_bayes.commands.output import write_json
 from backdrive_bayes.decisions.acceptance import assess
@@ -38,7 +39,7 @@ def verdict(tmp_path_factory):
         Limit("loop_area_J", lo=3e-4, hi=4e-4, process=Process(3.7e-4, 1e-5)),
         Limit("absorbed_J", hi=5.6e-4, rate=0.05, amplitude=0.06),
     )
-    write_json(folder / "verdict.json", assess([evidence(HOSTILE)], Limits(limits)))
+    write_json(folder / "verdict.json", told(assess([evidence(HOSTILE)], Limits(limits))))
     return json.loads((folder / "verdict.json").read_text()), *pages(folder)
 
 
@@ -75,7 +76,7 @@ def test_every_limit_stands_with_its_numbers(verdict):
 
 def test_what_is_uncovered_is_named(tmp_path):
     found = diagnosis(["sensor_lag"], sensor_lag=0.8, none=0.2)
-    write_json(tmp_path / "verdict.json", assess([evidence(diagnosis=found)], Limits((Limit("peak_angle_rad", hi=1.0),))))
+    write_json(tmp_path / "verdict.json", told(assess([evidence(diagnosis=found)], Limits((Limit("peak_angle_rad", hi=1.0),)))))
     text, _ = pages(tmp_path)
     assert "sensor lag (80 %)" in text[0] and "in no model at hand with probability 0.80: sensor lag 0.80" in text[0]
 
@@ -84,7 +85,7 @@ def test_what_is_uncovered_is_named(tmp_path):
 def comparison(tmp_path_factory):
     folder = tmp_path_factory.mktemp("comparison")
     a, b = evidence("metal"), evidence("plastic", seed=1, loop_area_J=1.9e-3, loops=((0.05, 0.1), (0.5, 0.1)))
-    write_json(folder / "comparison.json", compare([a, b], read_claims("paper")))
+    write_json(folder / "comparison.json", told(compare([a, b], read_claims("paper"))))
     return json.loads((folder / "comparison.json").read_text()), *pages(folder)
 
 
@@ -102,14 +103,15 @@ def test_a_comparison_holds_its_numbers(comparison):
 
 def test_a_unit_that_has_not_converged_is_named_and_the_others_stand(tmp_path):
     units = [evidence("a"), evidence("b", seed=1), evidence("c", seed=2, converged=False)]
-    write_json(tmp_path / "comparison.json", compare(units))
+    write_json(tmp_path / "comparison.json", told(compare(units)))
     text, _ = pages(tmp_path)
-    assert "INCONCLUSIVE IN PART" in text[0] and "Not converged: c." in text[0]
+    assert "INCONCLUSIVE IN PART" in text[0] and "The fits of c are not to be used" in text[0]
     assert "a and b at" in text[0]
 
 
 def test_a_difference_is_not_called_a_ratio(tmp_path):
-    write_json(tmp_path / "comparison.json", compare([evidence("a"), evidence("b", seed=1, loop_area_J=[1e-9] * 3, spread=2.0)]))
+    units = [evidence("a"), evidence("b", seed=1, loop_area_J=[1e-9] * 3, spread=2.0)]
+    write_json(tmp_path / "comparison.json", told(compare(units)))
     row = read_result(tmp_path / "comparison.json", COMPARISON)["pairs"][0]["conditions"][0]["indicators"]["loop_area_J"]
     text, _ = pages(tmp_path)
     assert row["ratio"] is None and f"{interval_text(row['difference'], 1e3)} difference [mJ]" in text[0]
@@ -179,10 +181,10 @@ def test_all_results_of_a_folder_make_chapters(tmp_path):
 
     write_result(tmp_path, records=1)
     (tmp_path / "posterior.nc").unlink()
-    write_json(tmp_path / "verdict.json", assess([evidence("u")], Limits((Limit("peak_angle_rad", hi=1.0),))))
+    write_json(tmp_path / "verdict.json", told(assess([evidence("u")], Limits((Limit("peak_angle_rad", hi=1.0),)))))
     text, _ = pages(tmp_path)
     overview = text[0]
-    assert "ACCEPTED" in overview and "converged; 1 record" in overview and "structure not examined" in overview
+    assert "ACCEPTED" in overview and "CONVERGED; 1 record" in overview and "structure not examined" in overview
     assert "Contents" in overview and "Key indicators" in overview and re.search(r"Results of \d+ [A-Z][a-z]+ \d{4}", overview)
     assert "ACCEPTED" in text[1] and "no diagnosis was given" in text[1] and "CONVERGED" in text[2]
 

@@ -177,11 +177,11 @@ def test_many_records_and_a_pair_keep_the_summary_on_one_page(tmp_path):
 
 
 def test_a_fit_and_a_diagnosis_in_one_folder_make_two_chapters(tmp_path):
-    write_diagnosis(tmp_path, 1)
+    write_diagnosis(tmp_path, 1, unit="u")
     write_result(tmp_path, records=1)
     (tmp_path / "posterior.nc").unlink()
     pages, _ = pages_of(tmp_path)
-    assert "converged; 1 record" in pages[0] and "CONVERGED" in pages[1] and "CAUSE" in pages[2]
+    assert "CONVERGED; 1 record" in pages[0] and "CONVERGED" in pages[1] and "CAUSE" in pages[2]
 
 
 def test_a_broken_result_is_one_clear_line(tmp_path):

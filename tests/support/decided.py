@@ -9,6 +9,7 @@ from support_results import indicators
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 from support.made_posterior import made_fit
+from support.told import told
 
 TYPICAL = {
     "lost_motion_rad": 0.0095,
@@ -96,17 +97,25 @@ def write_evidence(folder, name="u", loops=LOOPS, diagnosis=None, converged=True
     posterior, about = made_fit(name, tuple(loops), seed, size)
     about["model"]["effects"] = list(effects)
     about["convergence"] |= {"converged": converged, "advice": "" if converged else "not converged within the budget"}
-    keep_fit(posterior, about, folder, figures=False)
+    keep_fit(posterior, told(about), folder, figures=False)
     if diagnosis:
-        (folder / "diagnosis.json").write_text(json.dumps(diagnosis), encoding="utf-8")
+        of_unit = {key: about[key] for key in ("unit", "data_sha256", "unit_sha256", "version")}
+        (folder / "diagnosis.json").write_text(json.dumps(told(diagnosis | of_unit)), encoding="utf-8")
     return folder
 
 
 def diagnosis(answer=(), **which):
     """A diagnosis object with those probabilities by effect."""
     found = [{"effect": n, "probability": p} for n, p in which.items()]
-    return {"schema": "backdrive-bayes/diagnosis/1", "which": found, "answer": {"effects": list(answer)},
-            "gap": {"probability": 0.9}, "next_test": {"do": "Measure at another rate."}}  # fmt: skip
+    return {
+        "schema": "backdrive-bayes/diagnosis/1",
+        "inconclusive": "",
+        "convergence": {"converged": True},
+        "which": found,
+        "answer": {"effects": list(answer)},
+        "gap": {"probability": 0.9},
+        "next_test": {"do": "Measure at another rate."},
+    }
 
 
 def _about(name, loops, converged, k, effects):

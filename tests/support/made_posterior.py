@@ -90,7 +90,9 @@ def _made_fit(name, loops, seed, size):
     truth = KnownReducer({n: size * w for n, w in truth.weights.items()})
     posterior = as_saved(made_posterior(truth, loops, seed=seed, name=name))
     about = indicators_json(IndicatorDraws(posterior, 0.03), 0.9)
-    return posterior, stamped(about, posterior.data_hashes, seed, FitOptions().to_json())
+    about |= {"findings": [], "forced": False}
+    origin = {"unit": name, "data_sha256": list(posterior.data_hashes), "unit_sha256": ""}
+    return posterior, stamped(about, origin, seed, FitOptions().to_json())
 
 
 def made_fit(name="u", loops=LOOPS, seed=0, size=1.0):

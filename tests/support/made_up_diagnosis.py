@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 
+from support.told import told
+
 RATES = (0.05, 0.01, 0.1)
 NOISE = 3.1e-5
 EFFECTS = (
@@ -29,7 +31,7 @@ EFFECTS = (
 def write_diagnosis(folder, count=3, **changes):
     """Write diagnosis.json into ``folder`` and return its object."""
     folder.mkdir(parents=True, exist_ok=True)
-    result = diagnosis(count) | changes
+    result = told(diagnosis(count) | changes)
     (folder / "diagnosis.json").write_text(json.dumps(result), encoding="utf-8")
     return result
 
