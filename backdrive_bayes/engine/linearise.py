@@ -75,10 +75,6 @@ class Linear:
         """Mean weights by group."""
         return self.design.split(self.solution.mean)
 
-    def whitened(self, design: Design) -> Whitened:
-        """The columns of another design and the angles, whitened as the unit's own."""
-        return whiten(design.records(), self.angles, self.covariances, self.data.noise_dof, self.reduced.trust)
-
     def residuals(self) -> list[np.ndarray]:
         """Whitened residual of each record's blocks."""
         white = self.data.y - self.data.x @ self.solution.mean
@@ -101,7 +97,7 @@ def learn_jitter(linear: Linear) -> Jitter:
 
     def height(jitter):
         size = Jitter(jitter.torque * noise, jitter.length)
-        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof, reduced.trust)
+        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof)
         prior = -0.5 * (np.log(jitter.torque / USUAL_JITTER.torque) / JITTER_LOG_SD) ** 2
         return data.log_marginal(scale) + data.log_volume + prior
 
@@ -191,7 +187,7 @@ class _Search:
             level = float(np.log(effect.present(self.reduced.context)))
             priors[effect.name] = (level, 0.0 if effect is BENCH_HYSTERESIS else WIDE)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
-        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.trust)
+        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof)
         scales = design.scales(priors)
         if start is not None:
             return data, *find_scales(data, scales, start, 4)
