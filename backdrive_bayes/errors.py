@@ -11,6 +11,9 @@ class BadInput(ValueError):
         self.where, self.expected, self.found = str(where), str(expected), str(found)
         super().__init__(" ".join(f"{self.where}: expected {self.expected}, found {self.found}".split()))
 
+    def __reduce__(self):
+        return type(self), (self.where, self.expected, self.found)
+
 
 class MissingExtra(ImportError):
     """An optional dependency that the asked-for feature needs is not installed."""

@@ -19,9 +19,11 @@ ORDER = (
     "engine",
     "indicators",
     "decisions",
+    "pooling",
     "bench",
     "gap",
     "blind",
+    "fleet",
     "figures",
     "report",
     "commands",
@@ -33,12 +35,12 @@ ORDER = (
 FORBIDDEN = {
     "bench": {"engine", "indicators"},
     # A figure or a report is made from saved results and computes nothing.
-    "figures": {"records", "mechanics", "engine", "indicators", "decisions", "bench", "gap", "blind"},
-    "report": {"records", "mechanics", "engine", "indicators", "decisions", "bench", "gap", "blind"},
+    "figures": {"records", "mechanics", "engine", "indicators", "decisions", "bench", "gap", "blind", "pooling", "fleet"},
+    "report": {"records", "mechanics", "engine", "indicators", "decisions", "bench", "gap", "blind", "pooling", "fleet"},
 }
 ALONE = {"mechanics": {"backdrive_bayes.records.reduction", "backdrive_bayes.errors"}}
 """What a room may import from others; mechanics know of a record nothing but its blocks."""
-HEAVY = ("matplotlib", "corner", "typst", "dask", "pyarrow", "nptdms", "openpyxl", "asammdf")
+HEAVY = ("matplotlib", "corner", "typst", "dask", "distributed", "pyarrow", "nptdms", "openpyxl", "asammdf")
 
 
 def module_name(path):
@@ -152,7 +154,12 @@ def test_emcee_is_known_to_one_module():
 def test_optional_libraries_stay_out_of_the_core(library):
     readers = {"pyarrow", "nptdms", "openpyxl", "asammdf"}
     at_home = {"records"} if library in readers else {"figures", "report", "commands"}
+    at_home |= {"fleet"} if library in {"dask", "distributed", "pyarrow"} else set()
     assert {room(m) for m in importers_of(library)} <= at_home
+
+
+def test_dask_is_known_to_one_module():
+    assert importers_of("distributed") == importers_of("dask") == {"backdrive_bayes.fleet.cluster"}
 
 
 def loaded_after(statement):

@@ -20,6 +20,7 @@ VERBS = {
     "predict": "predict",
     "simulate": "simulate",
     "blind": "blind",
+    "fleet": "fleet",
     "report": "report",
     "demo": "demo",
 }

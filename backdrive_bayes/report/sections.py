@@ -5,7 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.report import acceptance_section, blind_section, comparison_section, diagnosis_section, fit_section
+from backdrive_bayes.report import (
+    acceptance_section,
+    blind_section,
+    comparison_section,
+    diagnosis_section,
+    fit_section,
+    fleet_section,
+)
 from backdrive_bayes.report.blocks import Chapter
 from backdrive_bayes.results import (
     DIAGNOSIS,
@@ -23,6 +30,7 @@ SECTIONS = {
     "indicators.json": fit_section.chapter,
     "diagnosis.json": diagnosis_section.chapter,
     "blind.json": blind_section.chapter,
+    "fleet.json": fleet_section.chapter,
 }
 """Result file name → function that reads its folder and returns a chapter; chapters come in this order."""
 

@@ -1,0 +1,61 @@
+"""The Parquet table: what result files hold, a row a unit and record, with a type a column."""
+
+import json
+
+import pytest
+from support.fleet_units import row
+
+from backdrive_bayes.fleet.store import DONE, FAILED, locked, read_stored, result_path, write_result
+from backdrive_bayes.fleet.table import NAME, compact
+from backdrive_bayes.fleet.units import FleetUnit
+
+parquet = pytest.importorskip("pyarrow.parquet", reason="the extra fleet is not installed")
+STAMP = {"files_sha256": "f", "version": "1", "seed": 3, "options": {}}
+
+
+@pytest.fixture
+def out(tmp_path):
+    with locked(tmp_path / "out"):
+        pass
+    return tmp_path / "out"
+
+
+def kept(out, tmp_path, results):
+    units = [FleetUnit(name, tmp_path / name) for name in results]
+    for unit in units:
+        rows = results[unit.name]
+        told = (FAILED, rows, []) if isinstance(rows, str) else (DONE, None, rows)
+        write_result(out, unit, STAMP, *told)
+    return units
+
+
+def test_a_row_a_unit_and_record_and_one_for_an_error(out, tmp_path):
+    units = kept(out, tmp_path, {"b": [row("b", 1, file="1.csv"), row("b", 2.5, file="2.csv")], "a": "no cycle"})
+    assert compact(out, units) == 3
+    table = parquet.read_table(out / NAME).to_pylist()
+    assert [(r["unit"], r["file"], r["status"], r["error"]) for r in table] == [
+        ("b", "1.csv", "done", None), ("b", "2.csv", "done", None), ("a", None, "failed", "no cycle"),
+    ]  # fmt: skip
+    assert [r["lost_motion_rad"] for r in table] == [1.0, 2.5, None] and table[0]["seed"] == 3
+    assert all(json.loads((out / r["result"]).read_text())["unit"] == r["unit"] for r in table)
+
+
+def test_columns_have_the_types_of_their_values(out, tmp_path):
+    compact(out, kept(out, tmp_path, {"u": [row("u", 1, evaluations=12)], "v": [row("v", 0.5, evaluations=7, serial="A7")]}))
+    schema = parquet.read_schema(out / NAME)
+    wanted = {"lost_motion_rad": "double", "evaluations": "int64", "converged": "bool", "serial": "string", "verdict": "string"}
+    assert {name: str(schema.field(name).type) for name in wanted} == wanted
+
+
+def test_every_number_is_that_of_the_result_file(out, tmp_path):
+    units = kept(out, tmp_path, {f"u{i}": [row(f"u{i}", 0.1 * i)] for i in range(40)})
+    compact(out, units)
+    table = parquet.read_table(out / NAME).to_pylist()
+    for unit, found in zip(units, table, strict=True):
+        saved = read_stored(out, unit)["rows"][0]
+        assert {key: found[key] for key in saved} == saved
+
+
+def test_results_of_units_that_are_no_more_stay_out(out, tmp_path):
+    units = kept(out, tmp_path, {"u": [row("u")], "gone": [row("gone")]})
+    assert compact(out, units[:1]) == 1 and result_path(out, units[1]).exists()
