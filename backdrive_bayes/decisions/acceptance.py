@@ -20,6 +20,7 @@ from backdrive_bayes.decisions.global_risk import global_risks, process_of_batch
 from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops
 from backdrive_bayes.decisions.next_step import advice, repeats_to_settle
+from backdrive_bayes.decisions.pool import Pool
 from backdrive_bayes.decisions.structure import Structure, weigh
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
@@ -52,8 +53,8 @@ class Judged:
 def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
     """The verdict object of a unit from one or several models' draws.
 
-    ``batch`` holds evidence of other units of the same process, for global risks. Raises BadInput where a limit names a loop
-    that was neither measured nor can be predicted.
+    ``batch`` holds evidence of other units of the same process, or is a batch pooled, for global risks. Raises BadInput where
+    a limit names a loop that was neither measured nor can be predicted.
     """
     structure = weigh(evidences, probabilities)
     judged = [j for limit in limits.limits for j in _judge(structure, limit, limits)]
@@ -178,7 +179,7 @@ def _row(structure: Structure, judged: Judged, limits: Limits, batch) -> dict:
         "naive": _naive(first, limit, loop),
         "histogram": _histogram(mixed),
     }
-    return row | {"global": _global(row, limit, limits, batch)}
+    return row | {"global": _global(row, limit, limits, batch, first.about["k"] * first.rated_torque, level)}
 
 
 def _mixture(structure, values, draws: int = 4000):
@@ -204,18 +205,21 @@ def _naive(evidence: Evidence, limit: Limit, loop: Loop) -> dict:
     return {"value": value, "inside": None if value is None else bool(limit.lo <= value <= limit.hi)}
 
 
-def _global(row, limit: Limit, limits: Limits, batch) -> dict | None:
+def _global(row, limit: Limit, limits: Limits, batch, lost_motion_at: float, level: float) -> dict | None:
     """Global risks of this decision rule over units of the process, measured as this one was."""
-    process, units = limit.process, 0
-    if process is None and batch:
-        process, units = _process(limit, row, batch)
-    if process is None or row["sd"] <= 0:
+    if (limit.process is None and not batch) or row["sd"] <= 0:
         return None
     accepted = acceptance_interval(row["sd"], limit.lo, limit.hi, 1 - limits.consumer)
     # An estimate is rejected where p_c is at most the producer's risk: outside the interval of larger p_c.
     kept = acceptance_interval(row["sd"], limit.lo, limit.hi, limits.producer) or (np.inf, -np.inf)
-    found = global_risks(process, row["sd"], (limit.lo, limit.hi), accepted, kept)
-    return {"process": process.to_json(), "batch_units": units, "uncertainty": row["sd"], "accepted": accepted} | found.to_json()
+    rule = row["sd"], (limit.lo, limit.hi), accepted, kept
+    if limit.process is None and isinstance(batch, Pool):
+        process = batch.predictive(limit.indicator, row["loading_rate_Nm_per_s"], row["amplitude_Nm"], lost_motion_at)
+        units, found = process.units, process.risks(*rule, level)
+    else:
+        process, units = (limit.process, 0) if limit.process else _process(limit, row, batch)
+        found = global_risks(process, *rule).to_json()
+    return {"process": process.to_json(), "batch_units": units, "uncertainty": row["sd"], "accepted": accepted} | found
 
 
 def _process(limit, row, batch):

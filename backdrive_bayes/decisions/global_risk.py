@@ -124,6 +124,7 @@ def _mass(pieces, process, uncertainty=None, interval=None, complement=False) ->
         if uncertainty is not None:
             lo, hi = ((edge - x) / uncertainty for edge in interval)
             inside = stats.norm.cdf(hi) - stats.norm.cdf(lo)
-            value = value * (stats.norm.cdf(lo) + stats.norm.sf(hi) if complement else inside)
+            # Outside of an interval that holds nothing, as (inf, -inf), is everything, once.
+            value = value * (np.minimum(stats.norm.cdf(lo) + stats.norm.sf(hi), 1.0) if complement else inside)
         total += 0.5 * (b - a) * float(weight @ value)
     return float(total)

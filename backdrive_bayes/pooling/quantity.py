@@ -1,0 +1,136 @@
+"""One quantity pooled over a batch: mean and spread, the next unit, every unit's shrunk interval, and the information lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from backdrive_bayes.indicators.intervals import interval
+from backdrive_bayes.pooling.hierarchy import FEWEST_UNITS, Hierarchy, sample_hierarchy
+from backdrive_bayes.pooling.loss import MOST_BITS, batch_loss, fit_loss, unit_loss
+from backdrive_bayes.pooling.mixture import Mixture, fit_mixture
+
+KEPT = 200
+"""Draws of the hierarchy that losses and units' intervals are taken from, and that are saved for the next unit."""
+LOWER_ENDS = 21
+"""Intervals among which the shortest is taken."""
+_APART = "look at it and pool the batch without it, or measure it again with more records"
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """A unit's likelihood of a quantity: draws ``x`` (draws,), the ``weight`` that takes its prior out, and the mixture of both.
+
+    ``loss`` is that of the compression [bit], ``prior_shift`` how far the prior had moved the draws' mean, in their standard
+    deviations.
+    """
+
+    x: np.ndarray
+    weight: np.ndarray
+    mixture: Mixture
+    loss: float
+    prior_shift: float
+
+
+def likelihood(draws, prior) -> Likelihood:
+    """A unit's likelihood from posterior ``draws`` (draws,) and draws of its ``prior`` (prior draws,)."""
+    x = np.asarray(draws, float)
+    log_weight = -fit_mixture(prior).log_density(x)
+    weight = np.exp(log_weight - log_weight.max())
+    mixture = fit_mixture(x, weight)
+    sd = float(x.std()) or 1e-300
+    shift = float(x.mean() - weight @ x / weight.sum()) / sd
+    return Likelihood(x, weight, mixture, fit_loss(mixture, x, weight), shift)
+
+
+def pool_quantity(names, draws, priors, seed: int, level: float) -> dict:
+    """The object of one quantity from units' ``draws`` and ``priors``, lists of arrays (draws,) in SI units.
+
+    Positive quantities are pooled by their logarithms: ``mean`` is then the geometric mean and ``spread`` the standard deviation
+    of the logarithm. Where nothing is to be told ``refused`` says why, and what to do instead.
+    """
+    log = all(np.min(d) > 0 for d in draws)
+    forward, back = (np.log, np.exp) if log else (np.asarray, np.asarray)
+    priors = [p[p > 0] if log else p for p in priors]
+    units = [likelihood(forward(d), forward(p)) for d, p in zip(draws, priors, strict=True)]
+    rows = [_row(name, d, u, level) for name, d, u in zip(names, draws, units, strict=True)]
+    kept = [i for i, u in enumerate(units) if u.loss <= MOST_BITS]
+    found = {"scale": "log" if log else "linear", "units": len(kept), "refused": None, "of_units": rows}
+    if len(kept) < FEWEST_UNITS:
+        return found | {"refused": f"{len(kept)} units tell enough of it and {FEWEST_UNITS} are needed: add units or records"}
+    hierarchy = sample_hierarchy([units[i].mixture for i in kept], seed)
+    small = hierarchy.thinned(KEPT)
+    found |= {"convergence": hierarchy.convergence.to_json(), "loss_bits": _batch_loss(small, [units[i] for i in kept])}
+    refused = _refused(found, [names[i] for i in kept], [units[i] for i in kept], small)
+    if refused:
+        return found | {"refused": refused}
+    for i in kept:
+        rows[i] |= _pooled(small, units[i], back, level)
+    return found | _told(hierarchy, small, back, level)
+
+
+def _told(hierarchy: Hierarchy, small: Hierarchy, back, level) -> dict:
+    lo, median, hi = back(small.next_unit.quantile([0.5 - level / 2, 0.5, 0.5 + level / 2]))
+    below, above = back(small.next_unit.quantile(ndtr([-1.0, 1.0])))
+    return {
+        "mean": interval(back(hierarchy.mean), level),
+        "spread": shortest(hierarchy.spread, level),
+        "next_unit": {"median": float(median), "lo": float(lo), "hi": float(hi), "sd": float(0.5 * (above - below))},
+        "predictive": {"mean": small.mean.tolist(), "spread": small.spread.tolist()},
+    }
+
+
+def shortest(values, level: float) -> dict:
+    """Median and shortest interval of positive ``values`` (draws,); it begins at zero where they do not keep away from it.
+
+    A central interval never reaches zero, so that it would exclude a batch whose units do not differ.
+    """
+    tail = np.linspace(0, 1 - level, LOWER_ENDS)
+    low, high = np.quantile(values, tail), np.quantile(values, tail + level)
+    low[0], high[-1] = 0.0, np.max(values)
+    best = int(np.argmin(high - low))
+    return {"median": float(np.median(values)), "lo": float(low[best]), "hi": float(high[best])}
+
+
+def _row(name, draws, unit: Likelihood, level) -> dict:
+    row = {"unit": name, "own": interval(draws, level), "pooled": None, "prior_shift_sd": unit.prior_shift}
+    row |= {"loss_bits": unit.loss, "effective_draws": _effective(unit.weight), "refused": None}
+    if unit.loss > MOST_BITS:
+        row["refused"] = f"left out: {_why(row['effective_draws'])}; measure it with more records"
+    return row
+
+
+def _why(effective):
+    if effective < 100:
+        return f"its prior holds it so firmly that only {effective:.0f} effective draws tell what its data say"
+    return "its posterior is no mixture of three normal distributions"
+
+
+def _pooled(small, unit, back, level) -> dict:
+    bits, effective = unit_loss(small, unit.mixture, unit.x, unit.weight)
+    found = {"loss_bits": max(bits, unit.loss), "effective_draws": effective}
+    if bits > MOST_BITS:
+        return found | {"refused": f"{effective:.0f} effective draws lie where the other units put it: {_APART}"}
+    lo, median, hi = back(small.pooled(unit.mixture).quantile([0.5 - level / 2, 0.5, 0.5 + level / 2]))
+    return found | {"pooled": {"median": float(median), "lo": float(lo), "hi": float(hi)}}
+
+
+def _batch_loss(small, units) -> float:
+    return batch_loss(small, [u.mixture for u in units], [u.x for u in units], [u.weight for u in units])
+
+
+def _refused(found, names, units, small) -> str | None:
+    if not found["convergence"]["converged"]:
+        return f"the hierarchy did not converge ({found['convergence']['worst']}): add units"
+    if found["loss_bits"] <= MOST_BITS:
+        return None
+    alone = [batch_loss(small, [u.mixture], [u.x], [u.weight]) for u in units]
+    worst = int(np.argmax(alone))
+    lost = f"{found['loss_bits']:.2g} bit are lost by re-weighting stored draws (at most {MOST_BITS:g})"
+    return f"{lost}, most of it by {names[worst]}: {_APART}"
+
+
+def _effective(weight) -> float:
+    return float(weight.sum() ** 2 / np.sum(weight**2))
