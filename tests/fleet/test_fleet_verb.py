@@ -74,11 +74,11 @@ def out(fleet, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def alone(fleet, tmp_path_factory):
-    """The rows and the kept folder of one of the units, worked on in this process, judged as well."""
+    """The rows and the kept folder of one of the units, worked on in this process on two threads, judged as well."""
     limits = tmp_path_factory.mktemp("limits") / "limits.toml"
     limits.write_text(LIMITS)
     folder = tmp_path_factory.mktemp("alone") / "u-2"
-    with threadpool_limits(1, user_api="blas"):
+    with threadpool_limits(2, user_api="blas"):
         return UnitWork(FitOptions(), limits=read_limits(limits))(fleet / "u-2", folder), folder, limits
 
 
