@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import logging
+import sys
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,7 +17,9 @@ from backdrive_bayes.fleet.store import CannotKeep
 RETRIES = 2
 """Times that a unit is tried again after it took its worker down."""
 WAIT_S = 30
-"""For a running scheduler to answer and to show a worker [s]."""
+"""For a scheduler to answer and to show its workers [s]."""
+REPLACE_S = 2
+"""Between two looks whether a worker is missing [s]."""
 SETTINGS = {
     "distributed.scheduler.work-stealing": False,
     "distributed.scheduler.allowed-failures": RETRIES,
@@ -38,17 +41,37 @@ class Tls:
 
 @contextlib.contextmanager
 def local(workers: int) -> Iterator:
-    """A client of a cluster on this machine, processes of one thread each."""
+    """A client of a cluster on this machine, processes of one thread each that are replaced whenever they die."""
     distributed = _distributed()
     import dask
+    from tornado.ioloop import PeriodicCallback
 
+    _silence_tracker()
+    logging.getLogger("tornado.application").setLevel(logging.CRITICAL)
     with dask.config.set(SETTINGS), contextlib.ExitStack() as stack:
         cluster = distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1",
+            n_workers=0, threads_per_worker=1, processes=True, host="127.0.0.1",
             dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
         )  # fmt: skip
         stack.enter_context(cluster)
-        yield stack.enter_context(distributed.Client(cluster, set_as_default=False))
+        cluster.scale(workers)  # unlike a number given above it bears with workers that die while they start
+        watch = cluster.periodic_callbacks["replace"] = PeriodicCallback(lambda: _replace(cluster), 1000 * REPLACE_S)
+        cluster.loop.add_callback(watch.start)
+        client = stack.enter_context(distributed.Client(cluster, set_as_default=False))
+        with contextlib.suppress(TimeoutError):
+            client.wait_for_workers(workers, timeout=WAIT_S)
+        if not threads(client):
+            raise BadInput("--workers", f"a worker process that starts within {WAIT_S} s", "none")
+        yield client
+
+
+def _replace(cluster) -> None:
+    """Start workers anew whose keeper gave them up, as it does where one dies while it starts."""
+    gone = [name for name, keeper in cluster.workers.items() if keeper.status.name in ("closed", "failed")]
+    for name in gone:
+        del cluster.workers[name]
+    if gone:
+        cluster.scale(len(cluster.worker_spec))
 
 
 @contextlib.contextmanager
@@ -121,6 +144,18 @@ def run_all(client, function: Callable, items: dict, finished: Callable[[str, ob
 def deaths(error: Exception) -> int:
     """Workers that a call took down before it was given up; 0 where it ended otherwise."""
     return error.allowed_failures + 1 if isinstance(error, _distributed().KilledWorker) else 0
+
+
+def _silence_tracker() -> None:
+    """Start Python's resource tracker so that it says nothing of semaphores that it clears after an interrupted run."""
+    from multiprocessing import resource_tracker
+
+    option = "ignore:resource_tracker"
+    sys.warnoptions.append(option)
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove(option)
 
 
 def _outcome(future):

@@ -58,7 +58,7 @@ def summarise(units: list[tuple[str, str, list[dict]]], order: str | None = None
         "same_names": _same_names(done),
         "order": order,
         "loop": loop,
-        "charted": [{"unit": row["unit"], "batch": _batch(row), "order": str(row.get(order) or "")} for row in charted],
+        "charted": [{"unit": row["unit"], "batch": batch_of(row), "order": str(row.get(order) or "")} for row in charted],
         "false_alarm": FALSE_ALARM,
         "sigmas": SIGMAS,
         "charts": charts,
@@ -137,7 +137,7 @@ def _sigma(values):
     return float(ranges[ranges <= LARGEST_RANGE * ranges.mean()].mean() / MEAN_RANGE)
 
 
-def _batch(row):
+def batch_of(row):
     """What the unit file names, else the folder that the unit lies in; empty where it lies in none."""
     return str(row.get("batch") or row["unit"].rpartition("/")[0])
 
@@ -146,7 +146,7 @@ def _batches(charted):
     """Units and spread of each indicator by batch, and the probability of such differences by chance (Kruskal and Wallis)."""
     groups = defaultdict(list)
     for row in charted:
-        groups[_batch(row)].append(row)
+        groups[batch_of(row)].append(row)
     if len(groups) < 2:
         return None
     rows, tests = [], {}

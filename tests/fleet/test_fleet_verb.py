@@ -120,6 +120,23 @@ def test_a_second_run_keeps_all_and_changes_nothing(fleet, out, capsys):
     assert {p: p.read_bytes() for p in before} == before
 
 
+@pytest.mark.parametrize(("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")])
+def test_an_interrupted_fleet_ends_at_once_with_its_workers_in_one_line(fleet, tmp_path, number, code, word):
+    command = [sys.executable, "-m", "backdrive_bayes", "fleet", str(fleet), "-o", str(tmp_path / "out"), "--workers", "2"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, **pipes, start_new_session=True) as running:
+        assert "2 workers" in running.stdout.readline()
+        time.sleep(0.5)
+        workers = workers_of(running.pid)
+        os.killpg(running.pid, number)  # as a terminal does
+        _, complaints = running.communicate(timeout=20)
+    assert running.returncode == code and complaints.splitlines()[-1] == f"backdrive-bayes: {word}"
+    assert len(workers) == 2 and "Traceback" not in complaints and "Warning" not in complaints
+    for worker in workers:
+        worker.wait(10)
+    assert not list((tmp_path / "out").glob("units/*.part"))
+
+
 @pytest.mark.parametrize(
     ("options", "expected"),
     [

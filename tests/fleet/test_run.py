@@ -1,6 +1,7 @@
 """Runs: every unit once and the same whatever happens to workers, the scheduler, the disk or the run."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,6 +26,17 @@ from backdrive_bayes.fleet import cluster
 if __name__ == "__main__":
     with cluster.local(1) as client:
         print(client.scheduler.address, flush=True)
+        sys.stdin.read()
+"""
+TLS_CLUSTER = """
+import sys
+import distributed
+if __name__ == "__main__":
+    ca, key = sys.argv[1:]
+    files = {f"tls_{w}_{what}": p for w in ("scheduler", "worker", "client") for what, p in (("cert", ca), ("key", key))}
+    security = distributed.Security(require_encryption=True, tls_ca_file=ca, **files)
+    with distributed.LocalCluster(1, threads_per_worker=1, security=security, dashboard_address="127.0.0.1:0") as local:
+        print(local.scheduler_address, flush=True)
         sys.stdin.read()
 """
 RUN = """
@@ -165,6 +177,23 @@ def test_a_scheduler_that_goes_away_is_said_and_what_was_kept_stays(fleet, tmp_p
     assert kept and sum(read_stored(out, unit) is not None for unit in find_units(fleet, out)) >= len(kept)
 
 
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="certificates are made with openssl")
+def test_a_scheduler_that_speaks_tls_is_joined_with_its_files_and_not_without(fleet, tmp_path, undisturbed, monkeypatch):
+    ca, key = tmp_path / "ca.pem", tmp_path / "key.pem"
+    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=127.0.0.1", "-days", "2"]
+    subprocess.run([*command, "-keyout", str(key), "-out", str(ca)], check=True, capture_output=True)
+    monkeypatch.setattr(cluster, "WAIT_S", 5)
+    with started([sys.executable, "-c", TLS_CLUSTER, str(ca), str(key)]) as other:
+        address = other.stdout.readline().strip()
+        assert address.startswith("tls://")
+        with pytest.raises(BadInput, match="a running scheduler"), cluster.joined(address):
+            pass
+        with cluster.joined(address, cluster.Tls(str(ca), str(ca), str(key))) as client:
+            out, tally = run(client, fleet, tmp_path / "out")
+        other.stdin.close()
+    assert counts(tally) == {"done": UNITS} and files(out) == undisturbed
+
+
 def test_a_scheduler_that_is_not_there_is_said(monkeypatch):
     monkeypatch.setattr(cluster, "WAIT_S", 1)
     for address in ("tcp://127.0.0.1:9", "nonsense", "ftp://x:1"):
@@ -185,6 +214,24 @@ def test_a_run_that_is_killed_twice_goes_on_where_it_stood(fleet, tmp_path, two_
     _, tally = run(two_workers, fleet, out)
     assert 3 <= before < UNITS and tally.counts["kept"] >= before and files(out) == undisturbed
     assert sorted(p.name for p in (out / "units").iterdir()) == sorted(result_path(out, u).name for u in units)
+
+
+def test_workers_that_die_while_they_start_are_replaced(fleet, tmp_path, two_workers, undisturbed):
+    keepers = two_workers.cluster.workers
+    first = {name: keeper.pid for name, keeper in keepers.items()}
+    for pid in first.values():
+        os.kill(pid, signal.SIGKILL)
+    again, deadline = set(), time.monotonic() + 20
+    while len(again) < 2 and time.monotonic() < deadline:
+        for name, keeper in list(keepers.items()):
+            if keeper.pid not in (None, first[name]) and name not in again:
+                os.kill(keeper.pid, signal.SIGKILL)
+                again.add(name)
+    assert len(again) == 2
+    out, tally = run(two_workers, fleet, tmp_path / "out")
+    assert_each_once(tally)
+    assert files(out) == undisturbed
+    two_workers.wait_for_workers(2, timeout=30)
 
 
 def test_workers_killed_at_random_moments_lose_nothing(fleet, tmp_path, two_workers, undisturbed):
