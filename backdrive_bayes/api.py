@@ -27,6 +27,7 @@ from backdrive_bayes.decisions.comparison import compare as compare_evidence
 from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.limits import Limits, read_limits
 from backdrive_bayes.decisions.outcome import line
+from backdrive_bayes.decisions.pool import Pool
 from backdrive_bayes.indicators.loads import loads_json
 from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.records import record
@@ -200,14 +201,16 @@ def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
 
     ``fitted`` is a unit or the path of one, which is fitted and diagnosed; a fit or the folder of one, whose structure only a
     diagnosis beside it examines; a diagnosis, which judges the model it chose; or a list of fits of one unit under several
-    models with their ``probabilities``. ``batch`` are fits of other units of the same process, for global risks.
+    models with their ``probabilities``. ``batch`` are fits of other units of the same process, or the folder of a pooled batch,
+    for global risks.
     """
     models = list(fitted) if isinstance(fitted, list | tuple) else [fitted]
     name = "" if isinstance(limits, Limits) else Path(limits).name
     limits = limits if isinstance(limits, Limits) else read_limits(limits)
-    evidences, others = [_evidence(m, examined=True) for m in models], [_evidence(b) for b in batch]
+    evidences, pooled = [_evidence(m, examined=True) for m in models], isinstance(batch, str | Path)
+    others = Pool.read(Path(batch)) if pooled else [_evidence(b) for b in batch]
     result = assess(evidences, limits, probabilities, others) | collected([evidences[0].about])
-    options = {"limits": name, "models": len(models), "batch": [other.name for other in others]}
+    options = {"limits": name, "models": len(models), "batch": others.about["units"] if pooled else [o.name for o in others]}
     return Verdict(stamped_by(result, evidences[:1], **options))
 
 

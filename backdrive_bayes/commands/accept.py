@@ -40,7 +40,8 @@ def add_arguments(parser) -> None:
         metavar="OUT=PROBABILITY",
         help="a further fit of the same unit under another model that stays probable (repeatable); UNIT has the rest",
     )
-    parser.add_argument("--batch", type=Path, nargs="+", default=[], metavar="OUT", help="fits of other units of one process")
+    parser.add_argument("--batch", type=Path, nargs="+", default=[], metavar="OUT",
+                        help="for global risks: fits of other units of one process, or one pooled batch (fleet --pool batch)")
     add_fit_arguments(parser)
 
 
@@ -54,7 +55,7 @@ def run(args) -> int:
     if args.out:
         require_out(args.out)
     others, probabilities = _models(args.model)
-    batch = [Evidence.read(folder) for folder in args.batch]
+    batch, batch_units = _batch(args.batch)
     if is_result(args.unit):
         made, evidence, out = None, Evidence.read(args.unit), args.out or args.unit
         repeat_findings(evidence.name, evidence.about)
@@ -62,7 +63,7 @@ def run(args) -> int:
         made, evidence, out = _fit(args, limits, options)
     verdict = assess([evidence, *others], limits, probabilities, batch)
     verdict |= collected([evidence.about])
-    named = {"limits": args.limits.name, "models": len(others) + 1, "batch": [other.name for other in batch]}
+    named = {"limits": args.limits.name, "models": len(others) + 1, "batch": batch_units}
     stamped_by(verdict, [evidence], **named)
     if not made:
         refuse_company(out, verdict)
@@ -104,6 +105,21 @@ def _fit(args, limits, options):
     ready.stamp(result)["notes"] += ready.lines
     evidence = replace(Evidence.of(posterior, result), diagnosis=ready.stamp(diagnosis))
     return (posterior, result), evidence, args.out or default_out(unit.name, "accept")
+
+
+def _batch(folders: list[Path]):
+    """A pooled batch, or evidence of other units; and the names of the units."""
+    from backdrive_bayes.decisions.evidence import Evidence
+    from backdrive_bayes.decisions.pool import NAME, Pool
+
+    pooled = [folder for folder in folders if (folder / NAME).is_file()]
+    if not pooled:
+        found = [Evidence.read(folder) for folder in folders]
+        return found, [other.name for other in found]
+    if len(folders) > 1:
+        raise BadInput("--batch", "one pooled batch, or fits of other units", f"{len(folders)} folders, '{pooled[0]}' among them")
+    found = Pool.read(pooled[0])
+    return found, found.about["units"]
 
 
 def _models(given):

@@ -28,6 +28,7 @@ def add_arguments(parser) -> None:
     parser.add_argument("--diagnose", action="store_true", help="also diagnose every unit")
     parser.add_argument("--limits", type=Path, metavar="LIMITS.toml", help="also diagnose every unit and judge it against limits")
     parser.add_argument("--posteriors", action="store_true", help="keep every unit's result folder (about 3 MB a unit)")
+    parser.add_argument("--pool", choices=("batch",), help="also pool the units of every batch (keeps the posteriors)")
     parser.add_argument("--order", choices=("test_date", "serial", "unit"), help="order of the control charts (default: the first"
                         " of test_date, serial and path that every unit has)")  # fmt: skip
     add_fit_arguments(parser)
@@ -35,6 +36,7 @@ def add_arguments(parser) -> None:
 
 def run(args) -> int:
     """Write a result file a unit, fleet.parquet, fleet.json and figures; 0 done, 4 where a unit has no result."""
+    from backdrive_bayes.commands.fleet_pool import show_pools
     from backdrive_bayes.fleet import cluster, store, summary, table
     from backdrive_bayes.fleet.run import run_fleet
     from backdrive_bayes.fleet.units import find_units
@@ -62,7 +64,9 @@ def run(args) -> int:
         keep_run(out, "fleet", began)
         if not args.no_figures:
             _draw(out)
+        pools = _pools(args, job, units, found, client)
     _summarise(result, tally, out)
+    show_pools(pools)
     return result["outcome"]["exit_code"]
 
 
@@ -80,7 +84,16 @@ def _job(args, out: Path):
     told["limits"] = [_plain(limit) for limit in limits.limits] if limits else None
     told["risks"] = [limits.consumer, limits.producer] if limits else None
     work = UnitWork(options, args.diagnose, limits, args.force)
-    return Job(out.resolve(), work, args.seed, told, args.posteriors)
+    return Job(out.resolve(), work, args.seed, told, args.posteriors or bool(args.pool))
+
+
+def _pools(args, job, units, found, client) -> list[Path]:
+    if not args.pool:
+        return []
+    from backdrive_bayes.commands.fleet_pool import pool_fleet
+
+    with progress() as note:
+        return pool_fleet(job, units, found, client, args.level, not args.no_figures, note)
 
 
 def _plain(limit) -> dict:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from backdrive_bayes.decisions.conformance import Verdict
-from backdrive_bayes.results import BLIND, CHECK, COMPARISON, DIAGNOSIS, FLEET, INDICATORS, PREDICTION, VERDICT
+from backdrive_bayes.results import BLIND, CHECK, COMPARISON, DIAGNOSIS, FLEET, INDICATORS, POOL, PREDICTION, VERDICT
 
 FORCED = "forced: the data are unfit, nothing that rests on them is to be trusted"
 UNEXAMINED = (
@@ -97,6 +97,13 @@ def _fleet(result):
     return Outcome("complete", f"all {counts['units']} units have a result")
 
 
+def _pool(result):
+    refused = [found for found in result["quantities"] if found["refused"]]
+    shares = f", {len(refused)} refused" if refused else ""
+    told = f"{len(result['quantities']) - len(refused)} indicators and parameters of {len(result['units'])} units{shares}"
+    return Outcome("pooled", told)
+
+
 _OF = {
     INDICATORS: _sampled("converged"),
     DIAGNOSIS: _diagnosis,
@@ -105,5 +112,6 @@ _OF = {
     CHECK: _check,
     BLIND: _blind,
     FLEET: _fleet,
+    POOL: _pool,
     PREDICTION: lambda result: Outcome("predicted", result["reason"]),
 }

@@ -16,6 +16,10 @@ KEPT = 200
 """Draws of the hierarchy that losses and units' intervals are taken from, and that are saved for the next unit."""
 LOWER_ENDS = 21
 """Intervals among which the shortest is taken."""
+MOST_SHIFT = 1.0
+"""Standard deviations by which a prior may have moved a posterior: beyond, fewer than a sixth of the draws tell what is left."""
+MOST_TIES = 0.01
+"""Share of draws that may repeat: a functional that is cut at the end of its range has no density there."""
 _APART = "look at it and pool the batch without it, or measure it again with more records"
 
 
@@ -24,7 +28,7 @@ class Likelihood:
     """A unit's likelihood of a quantity: draws ``x`` (draws,), the ``weight`` that takes its prior out, and the mixture of both.
 
     ``loss`` is that of the compression [bit], ``prior_shift`` how far the prior had moved the draws' mean, in their standard
-    deviations.
+    deviations; ``refused`` says why the unit cannot be pooled, None where it can.
     """
 
     x: np.ndarray
@@ -32,17 +36,32 @@ class Likelihood:
     mixture: Mixture
     loss: float
     prior_shift: float
+    refused: str | None
 
 
 def likelihood(draws, prior) -> Likelihood:
     """A unit's likelihood from posterior ``draws`` (draws,) and draws of its ``prior`` (prior draws,)."""
     x = np.asarray(draws, float)
-    log_weight = -fit_mixture(prior).log_density(x)
+    # Draws of the prior that were cut at the end of the range are no part of its density within.
+    log_weight = -fit_mixture(np.unique(prior)).log_density(x)
     weight = np.exp(log_weight - log_weight.max())
     mixture = fit_mixture(x, weight)
     sd = float(x.std()) or 1e-300
     shift = float(x.mean() - weight @ x / weight.sum()) / sd
-    return Likelihood(x, weight, mixture, fit_loss(mixture, x, weight), shift)
+    loss = fit_loss(mixture, x, weight)
+    return Likelihood(x, weight, mixture, loss, shift, _why_not(x, loss, shift, _effective(weight)))
+
+
+def _why_not(x, loss, shift, effective) -> str | None:
+    ties = 1.0 - np.unique(x).size / x.size
+    if ties > MOST_TIES:
+        return f"left out: {100 * ties:.0f} % of its draws lie at the end of the range; measure it with more records"
+    if abs(shift) > MOST_SHIFT:
+        return f"left out: its prior had moved it by {abs(shift):.2g} standard deviations; measure it with more records"
+    if loss <= MOST_BITS:
+        return None
+    lost = f"{loss:.2g} bit are lost"
+    return f"left out: {lost} ({effective:.0f} effective draws without its prior); measure it with more records"
 
 
 def pool_quantity(names, draws, priors, seed: int, level: float) -> dict:
@@ -56,7 +75,7 @@ def pool_quantity(names, draws, priors, seed: int, level: float) -> dict:
     priors = [p[p > 0] if log else p for p in priors]
     units = [likelihood(forward(d), forward(p)) for d, p in zip(draws, priors, strict=True)]
     rows = [_row(name, d, u, level) for name, d, u in zip(names, draws, units, strict=True)]
-    kept = [i for i, u in enumerate(units) if u.loss <= MOST_BITS]
+    kept = [i for i, u in enumerate(units) if not u.refused]
     found = {"scale": "log" if log else "linear", "units": len(kept), "refused": None, "of_units": rows}
     if len(kept) < FEWEST_UNITS:
         return found | {"refused": f"{len(kept)} units tell enough of it and {FEWEST_UNITS} are needed: add units or records"}
@@ -96,16 +115,7 @@ def shortest(values, level: float) -> dict:
 
 def _row(name, draws, unit: Likelihood, level) -> dict:
     row = {"unit": name, "own": interval(draws, level), "pooled": None, "prior_shift_sd": unit.prior_shift}
-    row |= {"loss_bits": unit.loss, "effective_draws": _effective(unit.weight), "refused": None}
-    if unit.loss > MOST_BITS:
-        row["refused"] = f"left out: {_why(row['effective_draws'])}; measure it with more records"
-    return row
-
-
-def _why(effective):
-    if effective < 100:
-        return f"its prior holds it so firmly that only {effective:.0f} effective draws tell what its data say"
-    return "its posterior is no mixture of three normal distributions"
+    return row | {"loss_bits": unit.loss, "effective_draws": _effective(unit.weight), "refused": unit.refused}
 
 
 def _pooled(small, unit, back, level) -> dict:

@@ -12,6 +12,7 @@ from backdrive_bayes.report import (
     diagnosis_section,
     fit_section,
     fleet_section,
+    pool_section,
 )
 from backdrive_bayes.report.blocks import Chapter
 from backdrive_bayes.results import (
@@ -31,6 +32,7 @@ SECTIONS = {
     "diagnosis.json": diagnosis_section.chapter,
     "blind.json": blind_section.chapter,
     "fleet.json": fleet_section.chapter,
+    "pool.json": pool_section.chapter,
 }
 """Result file name → function that reads its folder and returns a chapter; chapters come in this order."""
 
