@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.schemas.result_file import SHAPES, require_whole
 
 INDICATORS = "backdrive-bayes/indicators/1"
 DIAGNOSIS = "backdrive-bayes/diagnosis/1"
@@ -29,7 +30,7 @@ UNREADABLE = (OSError, ValueError, LookupError, RuntimeError, TypeError, Attribu
 
 
 def read_result(path: Path, schema: str) -> dict:
-    """A result file's object; BadInput where it is missing, no JSON or of another schema."""
+    """A result file's object; BadInput where it is missing, no JSON, of another schema, or lacks a key of it."""
     try:
         loaded = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -39,6 +40,8 @@ def read_result(path: Path, schema: str) -> dict:
     found = loaded.get("schema") if isinstance(loaded, dict) else None
     if found != schema:
         raise BadInput(path, f"schema '{schema}'", repr(found))
+    if schema in SHAPES:
+        require_whole(loaded, schema, path)
     return loaded
 
 

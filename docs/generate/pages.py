@@ -49,7 +49,8 @@ def write_pages(source: Path) -> None:
     _write(parts / "class.md", _class())
     _write(parts / "calibration.md", _calibration())
     _write(parts / "units.md", _units())
-    _write(parts / "schemas.md", _schemas())
+    _write(parts / "schemas.md", _schemas("_file"))
+    _write(parts / "result-schemas.md", _schemas("_json", "_parts"))
     _write(parts / "promises.md", _promises(root, source))
     reports = source / "_generated" / "reports"
     reports.mkdir(exist_ok=True)
@@ -112,9 +113,12 @@ def _units() -> str:
     return _table(["name", "unit"], [[f"`{name}`", unit] for name, unit in UNITS.items()])
 
 
-def _schemas() -> str:
+def _schemas(*endings) -> str:
+    """Every class of the modules with those endings: its keys, each with what it holds."""
     text = []
     for module in iter_modules(backdrive_bayes.schemas.__path__, "backdrive_bayes.schemas."):
+        if not module.name.endswith(endings):
+            continue
         loaded = import_module(module.name)
         shapes = [
             shape
@@ -131,7 +135,9 @@ def _schemas() -> str:
 
 def _keys(shape):
     found = msgspec.inspect.type_info(shape)
-    return [[f"`{f.encode_name}`", _words(f.type), "yes" if f.required else "no"] for f in found.fields]
+    # A key that may be left out is left out where it has no value, never null.
+    words = [(f, _words(f.type) if f.required else _words(f.type).removesuffix(" or null")) for f in found.fields]
+    return [[f"`{f.encode_name}`", text, "yes" if f.required else "no"] for f, text in words]
 
 
 def _words(kind) -> str:
@@ -140,7 +146,7 @@ def _words(kind) -> str:
     if isinstance(kind, info.Metadata):
         return (kind.extra_json_schema or {}).get("title") or _words(kind.type)
     if isinstance(kind, info.UnionType):
-        return " or ".join(dict.fromkeys(_words(k) for k in kind.types if not isinstance(k, info.NoneType)))
+        return " or ".join(dict.fromkeys("null" if isinstance(k, info.NoneType) else _words(k) for k in kind.types))
     if isinstance(kind, info.LiteralType):
         return " or ".join(f"`{v}`" for v in kind.values)
     if isinstance(kind, info.StructType):
@@ -149,6 +155,8 @@ def _words(kind) -> str:
         return f"list of {_words(kind.item_type)}"
     if isinstance(kind, info.DictType):
         return f"table of {_words(kind.value_type)}"
+    if isinstance(kind, info.AnyType):
+        return "anything"
     plain = {"StrType": "text", "FloatType": "number", "IntType": "whole number", "BoolType": "true or false"}
     return plain.get(type(kind).__name__, type(kind).__name__.removesuffix("Type").lower())
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.decided import CHAINS, DRAWS, KEPT, LOOPS, TYPICAL, diagnosis, evidence, write_evidence
 from support.made_posterior import made_fit
+from support.told import told
 from support_results import write_result
 
 from backdrive_bayes.decisions.evidence import Evidence
@@ -114,7 +115,7 @@ def diagnosed(folder, **changes):
     """Lay a diagnosis of the folder's data beside the fit, with some stamps changed."""
     about = json.loads((folder / "indicators.json").read_text())
     own = {key: about[key] for key in ("unit", "data_sha256", "unit_sha256", "version")}
-    (folder / "diagnosis.json").write_text(json.dumps(diagnosis() | own | changes))
+    (folder / "diagnosis.json").write_text(json.dumps(told(diagnosis() | own) | changes))
 
 
 def test_a_diagnosis_of_the_same_data_is_taken(folder, tmp_path):
@@ -128,7 +129,7 @@ def test_a_diagnosis_of_the_same_data_is_taken(folder, tmp_path):
     [
         ({"unit": "other"}, "expected a result of unit u, as indicators.json has, found other"),
         ({"data_sha256": ["f" * 64]}, "expected data with SHA-256 0123456789ab, .*found ffffffffffff"),
-        ({"data_sha256": None}, "expected data with SHA-256 0123456789ab, .*found none"),
+        ({"data_sha256": []}, "expected data with SHA-256 0123456789ab, .*found none"),
         ({"unit_sha256": "e" * 64}, "expected a unit file with SHA-256 none, .*found eeeeeeeeeeee"),
         ({"version": "0.0.1"}, "expected a result of version .*found 0.0.1"),
     ],

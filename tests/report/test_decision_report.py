@@ -191,7 +191,7 @@ def test_all_results_of_a_folder_make_chapters(tmp_path):
 
 def test_an_incomplete_verdict_is_one_clear_line(tmp_path):
     write_json(tmp_path / "verdict.json", {"schema": "backdrive-bayes/verdict/1"})
-    with pytest.raises(BadInput, match="complete result file"):
+    with pytest.raises(BadInput, match="verdict.json, key data_sha256: expected .*found no such key"):
         report.report_bytes([tmp_path])
 
 

@@ -188,5 +188,5 @@ def test_a_broken_result_is_one_clear_line(tmp_path):
     result = write_diagnosis(tmp_path, 1)
     del result["where"]["map"][0]["branch"]
     (tmp_path / "diagnosis.json").write_text(json.dumps(result))
-    with pytest.raises(BadInput, match="diagnosis.json: expected a complete result file"):
+    with pytest.raises(BadInput, match="diagnosis.json, where.map 1, key branch: expected one of"):
         report.report_bytes([tmp_path])

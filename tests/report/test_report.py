@@ -210,7 +210,7 @@ def test_folders_without_results_and_broken_results_are_one_clear_line(tmp_path)
     broken = json.loads((tmp_path / "indicators.json").read_text())
     del broken["records"][0]["torque_energy"]
     (tmp_path / "indicators.json").write_text(json.dumps(broken))
-    with pytest.raises(BadInput, match="complete result file"):
+    with pytest.raises(BadInput, match="indicators.json, records 1, key torque_energy: expected"):
         report.write_report([tmp_path], tmp_path / "r.pdf")
     assert not list(tmp_path.glob("*.pdf"))
 

@@ -109,12 +109,16 @@ def diagnosis(answer=(), **which):
     found = [{"effect": n, "probability": p} for n, p in which.items()]
     return {
         "schema": "backdrive-bayes/diagnosis/1",
+        "unit": "u",
+        "baseline": ["geometric", "elastic", "friction"],
         "inconclusive": "",
         "convergence": {"converged": True},
         "which": found,
         "answer": {"effects": list(answer)},
-        "gap": {"probability": 0.9},
-        "next_test": {"do": "Measure at another rate."},
+        "where": {"summary": "", "map": []},
+        "gap": {"probability": 0.9, "unlisted_probability": 0.0},
+        "shrink": None,
+        "next_test": {"do": "Measure at another rate.", "separates": [], "expected_entropy_drop_bits": 0.1},
     }
 
 

@@ -60,7 +60,7 @@ def diagnosis(count=3):
         "level": 0.9,
         "inconclusive": "",
         "records": entries,
-        "gap": {"probability": 0.998, "rms_rad": 3.6e-4, "noise_floor_rad": NOISE},
+        "gap": {"probability": 0.998, "unlisted_probability": 0.01, "rms_rad": 3.6e-4, "noise_floor_rad": NOISE},
         "where": {
             "summary": "78 % of the gap lies on the loading branches above 0.75 T_r (2.3 N·m), the same at all rates; "
             "unloading branches above 0.5 T_r hold 15 %.",

@@ -1,0 +1,142 @@
+"""diagnosis.json: where the gap lies, which effect causes it, how far it shrinks."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from msgspec import Struct, field
+
+from backdrive_bayes.schemas.result_parts import Branch, Convergence, Count, Curve, Interval, Number, Probability, Result
+from backdrive_bayes.schemas.words import Text
+
+
+class Gap(Struct):
+    """Whether there is a gap, and its size against the noise."""
+
+    probability: Probability
+    unlisted_probability: Probability
+    rms_rad: Number = None
+    noise_floor_rad: Number = None
+
+
+class Cell(Struct):
+    """One stretch of a branch: its share of the gap, and the gap's mean there."""
+
+    record: Text
+    branch: Branch
+    cycle: Count
+    torque_lo_Nm: float
+    torque_hi_Nm: float
+    share: Number
+    signed_rms_rad: Number
+    credible: bool = True
+
+
+class Where(Struct):
+    """Where the gap lies, in one sentence and as a map."""
+
+    summary: str
+    map: list[Cell]
+
+
+class EffectParameter(Interval, kw_only=True):
+    """A parameter of an effect with its unit."""
+
+    unit: str
+
+
+class Hypothesis(Struct):
+    """An effect or a pair, ``unknown`` or ``none``, and its probability; they sum to 1."""
+
+    effect: Text
+    probability: Probability
+    parameters: dict[str, EffectParameter] = field(default_factory=dict)
+
+
+class Answer(Struct):
+    """What is named: nothing for no gap, ``unknown`` for an unlisted effect, several where several act."""
+
+    effects: list[str]
+    credible_set_90: list[str] = field(default_factory=list)
+
+
+class HeldOut(Struct):
+    """A held-out record or leg before and after the effect is added."""
+
+    record: Text
+    before_rad: Number
+    after_rad: Number
+    noise_floor_rad: Number
+    closed_fraction: Interval | None = None
+
+
+class BeforeAfter(Struct):
+    """An indicator without and with the effect."""
+
+    before: Interval | None
+    after: Interval | None
+
+
+class Shrink(Struct):
+    """How far the gap shrinks on held-out data."""
+
+    held_out: str
+    before_rad: Number
+    after_rad: Number
+    noise_floor_rad: Number
+    closed_fraction: Interval
+    indicators: dict[str, BeforeAfter]
+    records: list[HeldOut] = field(default_factory=list)
+    gaussian_process: dict[str, Any] = field(default_factory=dict)
+    indicators_at: dict[str, Any] | None = None
+
+
+class NextTest(Struct):
+    """The measurement that would best separate what is still confusable."""
+
+    do: str
+    separates: list[str]
+    expected_entropy_drop_bits: Number
+    others: dict[str, Number] = field(default_factory=dict)
+
+
+class ParameterShift(Struct):
+    """A parameter of the baseline without and with the effect, its shift in standard deviations."""
+
+    parameter: Text
+    unit: str
+    before: Interval | None
+    after: Interval | None
+    shift_sd: Number
+
+
+class Residual(Struct):
+    """Residuals of a record over the torque."""
+
+    record: Text
+    torque_Nm: Curve
+    direction: Curve
+    before_rad: Curve
+    after_rad: Curve
+    noise_rad: Number = None
+
+
+class DiagnosisFile(Result, kw_only=True):
+    """All of it; ``inconclusive`` says why nothing is named, and is empty otherwise."""
+
+    schema: Literal["backdrive-bayes/diagnosis/1"]
+    unit: Text
+    baseline: list[str]
+    which: list[Hypothesis]
+    answer: Answer
+    where: Where
+    gap: Gap | None
+    shrink: Shrink | None
+    next_test: NextTest | None
+    inconclusive: str = ""
+    level: Probability = 0.9
+    k: Probability = 0.03
+    records: list[dict[str, Any]] = field(default_factory=list)
+    residual: list[Residual] = field(default_factory=list)
+    parameter_shift: list[ParameterShift] = field(default_factory=list)
+    convergence: Convergence | None = None
