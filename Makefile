@@ -1,4 +1,5 @@
 # make demo: set up and run the main job on the packaged data, ending in reports/demo/report.pdf
+# make demo-fleet: set up and evaluate the packaged fleet of twelve units, ending in reports/demo/fleet/report.pdf
 # make test: set up and run the tests
 # make docs: set up and build the documentation into build/docs; a warning is an error
 PYTHON ?= python3
@@ -7,11 +8,14 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS := 1
 export MPLBACKEND := Agg
 
-.PHONY: demo test docs lint clean
+.PHONY: demo demo-fleet test docs lint clean
 
 demo: $(VENV)/ready
 	$(BIN)/backdrive-bayes demo
 	cp reports/demo/reducer-1/figures/loop-2.png reports/demo/loop.png
+
+demo-fleet: $(VENV)/ready
+	$(BIN)/backdrive-bayes demo --fleet
 
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile

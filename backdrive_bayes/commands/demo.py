@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from backdrive_bayes.commands import accept, check, compare, diagnose, fit, report
+from backdrive_bayes.commands import accept, check, compare, diagnose, fit, fleet, report
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.results import BASELINE
 from backdrive_bayes.errors import BadInput
 
-HELP = "check, fit, diagnose, judge and compare the packaged twins and write one PDF"
+HELP = "check, fit, diagnose, judge and compare the packaged twins and write one PDF, or with --fleet evaluate the packaged fleet"
 UNITS = ("reducer-1", "reducer-2")
 
 
 def add_arguments(parser) -> None:
     """Options of this verb."""
     parser.add_argument("--data", type=Path, default=Path("data"), help="folder of the packaged units (default data)")
+    parser.add_argument("--fleet", action="store_true", help="fit the packaged fleet of twelve small units instead")
 
 
 def run(args) -> int:
-    """Check, fit, diagnose and judge every packaged unit, compare them, then the report; the worst code of the fits."""
-    out = args.out or Path("reports/demo")
+    """Check, fit, diagnose and judge every packaged unit, compare them, then the report; the worst code of the fits.
+
+    With ``args.fleet`` the packaged fleet and its report, and the fleet's code.
+    """
+    out = args.out or Path("reports/demo/fleet" if args.fleet else "reports/demo")
     if not (args.data / UNITS[0]).is_dir():
         raise BadInput(args.data, "the folder of packaged units (run from the project's folder or give --data)", "none")
+    if args.fleet:
+        return _fleet(args.data / "fleet", out, args.seed)
     say("The packaged units are synthetic twins of published reducers, not measurements.")
     check.run(Namespace(unit=args.data / "ugly", out=out / "ugly-check", seed=args.seed))
     codes, results = [], [out / name for name in UNITS]
@@ -39,3 +45,12 @@ def run(args) -> int:
     compare.run(Namespace(units=list(results), out=both, claims="paper", rope=0.05, **defaults))
     report.run(Namespace(results=[*results, both], out=out, seed=args.seed))
     return max(codes)
+
+
+def _fleet(folder: Path, out: Path, seed: int) -> int:
+    say("The packaged fleet is synthetic, of the model's own class: it shows the evaluation of many units and tests no model.")
+    options = ArgumentParser()
+    fleet.add_arguments(options)
+    code = fleet.run(options.parse_args([str(folder)], Namespace(out=out, seed=seed)))
+    report.run(Namespace(results=[out], out=out, seed=seed))
+    return code

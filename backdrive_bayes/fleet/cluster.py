@@ -160,7 +160,7 @@ def _silence_tracker() -> None:
 
 def _outcome(future):
     try:
-        if future.status in ("cancelled", "lost"):
+        if future.status == "cancelled":  # one that was lost with its worker is worked on again, and waited for below
             raise ConnectionError("the scheduler went away")
         error = future.exception()
         return (None, error) if error else (future.result(), None)

@@ -234,6 +234,22 @@ def test_workers_that_die_while_they_start_are_replaced(fleet, tmp_path, two_wor
     two_workers.wait_for_workers(2, timeout=30)
 
 
+def test_results_that_are_lost_with_their_worker_are_asked_for_again(fleet, tmp_path, two_workers, undisturbed):
+    killed = []
+
+    def note(text, share):
+        if not killed:
+            time.sleep(1.0)  # the others are done meanwhile; what they came to lies with the workers
+            killed.extend(two_workers.run(os.getpid).values())
+            for pid in killed:
+                os.kill(pid, signal.SIGKILL)
+            time.sleep(0.5)
+
+    out, tally = run(two_workers, fleet, tmp_path / "out", note=note)
+    assert_each_once(tally)
+    assert len(killed) == 2 and tally.counts["kept"] > 0 and files(out) == undisturbed
+
+
 def test_workers_killed_at_random_moments_lose_nothing(fleet, tmp_path, two_workers, undisturbed):
     stop = threading.Event()
 
