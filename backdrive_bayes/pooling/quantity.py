@@ -78,7 +78,7 @@ def pool_quantity(names, draws, priors, seed: int, level: float) -> dict:
     kept = [i for i, u in enumerate(units) if not u.refused]
     found = {"scale": "log" if log else "linear", "units": len(kept), "refused": None, "of_units": rows}
     if len(kept) < FEWEST_UNITS:
-        return found | {"refused": f"{len(kept)} units tell enough of it and {FEWEST_UNITS} are needed: add units or records"}
+        return found | {"refused": _too_few(len(kept), rows)}
     hierarchy = sample_hierarchy([units[i].mixture for i in kept], seed)
     small = hierarchy.thinned(KEPT)
     found |= {"convergence": hierarchy.convergence.to_json(), "loss_bits": _batch_loss(small, [units[i] for i in kept])}
@@ -129,6 +129,11 @@ def _pooled(small, unit, back, level) -> dict:
 
 def _batch_loss(small, units) -> float:
     return batch_loss(small, [u.mixture for u in units], [u.x for u in units], [u.weight for u in units])
+
+
+def _too_few(kept: int, rows) -> str:
+    reasons = [f"; {r['unit']} is {r['refused']}" for r in rows if r["refused"]]
+    return f"{kept} units tell enough of it and {FEWEST_UNITS} are needed: add units or records{''.join(reasons[:1])}"
 
 
 def _refused(found, names, units, small) -> str | None:
