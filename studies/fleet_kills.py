@@ -31,7 +31,7 @@ from backdrive_bayes.fleet.task import Job
 from backdrive_bayes.fleet.units import find_units
 
 WORKERS = 2
-BETWEEN_S = 1.5
+BETWEEN_S = 3.0
 """Mean of the exponential time between two kills of a worker."""
 RUNS_KILLED = (0.3, 0.65)
 """Shares of the units that are done when the whole run is killed, on the average."""

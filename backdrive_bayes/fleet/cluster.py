@@ -66,11 +66,11 @@ def local(workers: int) -> Iterator:
 
 
 def _replace(cluster) -> None:
-    """Start workers anew whose keeper gave them up, as it does where one dies while it starts."""
+    """Start workers anew whose keeper gave them up, as it does where one dies while it starts, and those that dask forgot."""
     gone = [name for name, keeper in cluster.workers.items() if keeper.status.name in ("closed", "failed")]
     for name in gone:
         del cluster.workers[name]
-    if gone:
+    if len(cluster.workers) < len(cluster.worker_spec):
         cluster.scale(len(cluster.worker_spec))
 
 
