@@ -5,7 +5,7 @@
 Batches are drawn with known mean and spread of a positive quantity, narrow and wide beside what one unit's data tell. Each unit
 is 1600 posterior draws: every other one's likelihood is normal in the logarithm, the others' is skewed (a gamma reading), its
 precision differs by a factor of four, and its prior is displaced by its own standard deviation. Faults are planted beside: a
-prior that is left in, and posteriors half as wide as they are. Writes reports/batch-pooling/coverage.json and README.md.
+prior that is left in, and posteriors half as wide as they are. Writes reports/batch-pooling/coverage.json.
 """
 
 from __future__ import annotations

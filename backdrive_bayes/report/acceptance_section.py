@@ -190,6 +190,8 @@ def _global_text(row):
     factor, unit = display_unit(row["unit"])
     found = row["global"]
     origin = f"{found['batch_units']} other units" if found["batch_units"] else f"stated, {found['process']['shape']}"
+    if found["process"]["shape"] == "pooled":
+        origin = f"a pooled batch of {found['batch_units']} units"
     risks = ", ".join(f"{who}'s {probability_text(found[who])}" for who in ("consumer", "producer"))
     outside = probability_text(found["nonconforming"])
     process = f"process {_process(found['process'], factor)} {unit} ({origin})"
