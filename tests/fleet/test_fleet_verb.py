@@ -164,3 +164,12 @@ def test_an_output_that_another_fleet_holds_is_one_line(tmp_path, capsys):
 def test_a_folder_without_units_is_one_line(tmp_path, capsys):
     assert main(["fleet", str(tmp_path), "-o", str(tmp_path / "out")]) == 2
     assert "a folder with units" in capsys.readouterr().err
+
+
+def test_the_demo_of_a_fleet_ends_in_a_report(tmp_path, capsys):
+    """The packaged fleet has a minute of fits; the way is the same for a fleet of one bad file."""
+    (tmp_path / "reducer-1").mkdir()
+    (tmp_path / "fleet").mkdir()
+    (tmp_path / "fleet" / "bad.csv").write_text("")
+    assert main(["demo", "--fleet", "--data", str(tmp_path), "-o", str(tmp_path / "out")]) == 4
+    assert "synthetic" in capsys.readouterr().out and (tmp_path / "out" / "report.pdf").read_bytes().startswith(b"%PDF")
