@@ -9,6 +9,7 @@ import pytest
 from support.decided import write_evidence
 from support.made_posterior import made_posterior
 
+from backdrive_bayes import api
 from backdrive_bayes.commands.main import main
 from backdrive_bayes.commands.output import write_json
 from backdrive_bayes.decisions.evidence import Evidence
@@ -97,6 +98,8 @@ def test_accept_takes_the_pool_for_its_global_risks(folders, kept, tmp_path, cap
     found = verdict["limits"][0]["global"]
     assert found["batch_units"] == 6 and found["process"]["shape"] == "pooled" and found["consumer"] < 1e-6
     assert verdict["options"]["batch"] == [f"u{i}" for i in range(6)]
+    same = api.accept(folders[0], limits, batch=kept).result["limits"][0]["global"]
+    assert same == found, "the Python interface takes the folder too"
     assert main([*arguments, "--batch", str(kept), str(folders[1])]) == 2
     assert "expected one pooled batch, or fits of other units, found 2 folders" in capsys.readouterr().err
 

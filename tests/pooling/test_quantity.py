@@ -85,6 +85,15 @@ def test_a_unit_far_from_its_batch_has_no_pooled_interval():
     assert sum(r["pooled"] is None for r in found["of_units"]) <= 2
 
 
+def test_a_loss_beyond_what_is_allowed_refuses_the_quantity_and_names_the_unit():
+    """A heavy-tailed unit twenty standard deviations away: its few draws near the batch do not say what it would be there."""
+    names, draws, priors = batch(20, 0.02, 3, own=0.05)
+    draws[4] = np.exp(1.0 + 0.05 * np.random.default_rng(0).standard_t(2.5, DRAWS))
+    found = pool_quantity(names, draws, priors, 0, LEVEL)
+    assert found["loss_bits"] > MOST_BITS and "mean" not in found and all(r["pooled"] is None for r in found["of_units"])
+    assert "bit are lost by re-weighting stored draws (at most 0.2), most of it by u4" in found["refused"]
+
+
 def test_a_unit_that_only_repeats_its_prior_is_left_out():
     names, draws, priors = batch(8, 0.1, 4)
     rng = np.random.default_rng(0)
