@@ -25,13 +25,16 @@ from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.results import FLEET, read_result
 
 CAPTIONS = {
-    "fleet-charts": "Control charts, one point a unit with its interval: centre (line), three sigma from moving ranges (broken), "
-    "units outside them (squares); the centre changes where drift is found. Right: difference of the units from each one on "
-    "from those before, in its standard deviations, with the limits that a fleet without drift passes at the stated rate.",
-    "fleet-distributions": "Distribution of the indicators' medians over the fleet, by batch where there are several.",
+    "fleet-charts": "Control charts, one point a unit, with its interval in small fleets: centre (line), three sigma from moving "
+    "ranges (broken), units outside them (squares); the centre changes where drift is found. Right: difference of the units from "
+    "each one on from those before, in its standard deviations, with the limits that a fleet without drift passes at the stated "
+    "rate.",
+    "fleet-distributions": "Distribution of the indicators' medians over the fleet (filled), and of batches where they are few.",
     "fleet-shares": "Units by verdict, and by the effect that the diagnosis names.",
 }
-MOST_BATCHES = len(SERIES)
+MOST_BATCHES = 4
+MOST_INTERVALS = 150
+"""Units up to which intervals and points are told apart."""
 _ORDERS = {"unit": "path", "test_date": "test date", "serial": "serial number"}
 _UNITS = {"lost_motion_rad": "rad", "loop_area_J": "J", "dissipation_ratio": "1"}
 
@@ -85,13 +88,15 @@ def _individuals(axes, chart, result):
     x = range(1, len(y) + 1)
     outside = set(chart["outside"])
     beyond = [u["unit"] in outside for u in result["charted"]]
-    axes.vlines(x, lo, hi, color=BLUE, linewidth=0.7, alpha=0.6)
-    axes.plot(x, y, linestyle="none", marker="o", markersize=2.5, color=BLUE)
+    few = len(y) <= MOST_INTERVALS
+    if few:
+        axes.vlines(x, lo, hi, color=BLUE, linewidth=0.7, alpha=0.6)
+    axes.plot(x, y, linestyle="none", marker="o", markersize=2.5 if few else 1.0, color=BLUE)
     axes.plot([i for i, b in zip(x, beyond, strict=True) if b], [v for v, b in zip(y, beyond, strict=True) if b],
-              linestyle="none", marker="s", markersize=5, markerfacecolor="none", color=VERMILLION)  # fmt: skip
+              linestyle="none", marker="s", markersize=5 if few else 3, markerfacecolor="none", color=VERMILLION)  # fmt: skip
     for side in (-1, 0, 1) if chart["sigma"] > 0 else (0,):
         line = [factor * (c + side * result["sigmas"] * chart["sigma"]) for c in chart["centre"]]
-        axes.step(x, line, where="mid", color=GREY, linewidth=0.9, linestyle=(0, (5, 3)) if side else "-")
+        axes.step(x, line, where="mid", color=GREY, linewidth=0.9, linestyle=(0, (5, 3)) if side else "-", zorder=3)
     axes.set_ylabel(two_lines(drawn_words(chart["indicator"]), f"[{unit}]" if unit else "[–]"))
 
 
@@ -105,7 +110,7 @@ def _differences(axes, chart):
     x = range(1, len(path) + 1)
     axes.plot(x, path, color=BLUE, linewidth=1.1)
     axes.plot([i for i, v in zip(x, path, strict=True) if abs(v) > limit], [v for v in path if abs(v) > limit],
-              linestyle="none", marker="s", markersize=3, color=VERMILLION)  # fmt: skip
+              linestyle="none", marker="s", markersize=3 if len(path) <= MOST_INTERVALS else 1, color=VERMILLION)  # fmt: skip
     for side in (-limit, limit):
         axes.axhline(side, color=GREY, linewidth=0.9, linestyle=(0, (5, 3)))
     told = "drift" if chart["drift"]["alarm"] else "no drift"
@@ -115,7 +120,8 @@ def _differences(axes, chart):
 
 def _distributions(result):
     figure = new_figure(2.4)
-    batches = [b["batch"] for b in result["batches"]["rows"]][:MOST_BATCHES] if result["batches"] else [None]
+    batches = [b["batch"] for b in result["batches"]["rows"]] if result["batches"] else []
+    batches = batches if len(batches) <= MOST_BATCHES else []
     for axes, chart in zip(figure.subplots(1, len(result["charts"]), squeeze=False)[0], result["charts"], strict=True):
         factor, unit = chart_unit(chart)
         values = [factor * v for v in chart["median"]]
@@ -123,13 +129,13 @@ def _distributions(result):
         low, high = min(values), max(values)
         edges = [low + (high - low or 1.0) * i / bins for i in range(bins + 1)]
         axes.hist(values, edges, color="0.85")
-        for look, batch in zip(SERIES, batches if len(batches) > 1 else [], strict=False):
+        for look, batch in zip(SERIES, batches, strict=False):
             own = [v for v, u in zip(values, result["charted"], strict=True) if u["batch"] == batch]
             axes.hist(own, edges, histtype="step", color=look["color"], linestyle=look["linestyle"], label=batch)
         axes.set_xlabel(f"{drawn_words(chart['indicator'])}{f' [{unit}]' if unit else ''}")
         few_ticks(axes)
     figure.axes[0].set_ylabel("units")
-    if len(batches) > 1:
+    if batches:
         figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
@@ -139,12 +145,15 @@ def _shares(result):
     figure = new_figure(0.9 + 0.22 * max(len(counts) for _, counts in panels))
     for axes, (title, counts) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
         names, total = list(counts), sum(counts.values())
-        axes.barh([words(n).replace("+", " + ") for n in names], list(counts.values()), color=BLUE, height=0.6)
-        for i, name in enumerate(names):
-            axes.text(counts[name], i, f" {counts[name]} ({100 * counts[name] / total:.0f} %)", va="center", fontsize=7.5)
+        bars = axes.barh([words(n).replace("+", " + ") for n in names], list(counts.values()), color=BLUE, height=0.6)
+        axes.bar_label(bars, [f"{n} ({_share(n / total)})" for n in counts.values()], padding=3, fontsize=7.5)
         axes.invert_yaxis()
         axes.set_xlim(0, 1.35 * max(counts.values()))
         axes.set_xlabel("units")
         axes.set_title(title)
         axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
     return figure
+
+
+def _share(share):
+    return f"{100 * share:.0f} %" if share >= 0.005 else "< 1 %"

@@ -14,6 +14,7 @@ from backdrive_bayes.fleet.drift import FALSE_ALARM, FEWEST, find_drift
 from backdrive_bayes.fleet.store import DONE, UNITS
 from backdrive_bayes.fleet.table import rows_of
 from backdrive_bayes.fleet.units import FleetUnit
+from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.results import FLEET
 
 INDICATORS = ("lost_motion_rad", "loop_area_J", "dissipation_ratio")
@@ -166,7 +167,8 @@ def _worst(done, charted, charts, keys):
     for unit, rows in done:
         p = rows[0].get("conformance_probability")
         if p is not None and rows[0]["verdict"] != "accepted":
-            found.append((p - 1e3, unit, f"{rows[0]['verdict']}, conforms with probability {p:.2g} ({rows[0]['limiting']})"))
+            why = f"{rows[0]['verdict']}, conforms with probability {probability_text(p)} ({rows[0]['limiting']})"
+            found.append((p - 1e3, unit, why))
     judged = {unit for _, unit, _ in found}
     for i, row in enumerate(charted):
         far = [(abs(c["median"][i] - c["centre"][i]) / c["sigma"], c["indicator"]) for c in charts if c["sigma"] > 0]

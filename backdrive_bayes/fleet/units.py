@@ -46,7 +46,8 @@ class FleetUnit:
 def find_units(folder: Path, out: Path) -> list[FleetUnit]:
     """Every unit folder below ``folder`` (or itself) and every record file outside of unit folders, in order of their names.
 
-    ``out`` and hidden folders are left out. Raises BadInput where there is none, or ``out`` lies inside a unit.
+    Links to unit folders count, links to other folders are not followed. ``out`` and hidden folders are left
+    out. Raises BadInput where there is none, or ``out`` lies inside a unit.
     """
     folder, out = Path(folder).resolve(), Path(out).resolve()
     if not folder.is_dir():
@@ -60,6 +61,7 @@ def find_units(folder: Path, out: Path) -> list[FleetUnit]:
             found.append(here)
             below.clear()
             continue
+        found += [here / name for name in below if (here / name).is_symlink() and (here / name / UNIT_FILE).is_file()]
         below[:] = sorted(name for name in below if not name.startswith(".") and here / name != out)
         found += [here / name for name in sorted(files) if not name.startswith(".") and record_suffix(here / name)]
     if not found:

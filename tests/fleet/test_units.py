@@ -21,6 +21,15 @@ def test_unit_folders_and_lone_records_are_found_in_order(tmp_path):
     assert names(tmp_path) == ["a/deep/er/u", "a/u", "b/u", "lone.csv"]
 
 
+def test_links_to_units_count_and_links_to_folders_are_not_followed(tmp_path):
+    elsewhere, fleet = make_unit(tmp_path / "elsewhere" / "u").parent, tmp_path / "fleet"
+    make_unit(fleet / "a")
+    (fleet / "b").symlink_to(elsewhere / "u")
+    (fleet / "c").symlink_to(elsewhere)
+    (fleet / "round").symlink_to(fleet)
+    assert names(fleet) == ["a", "b"]
+
+
 def test_a_folder_that_is_a_unit_is_a_fleet_of_one(tmp_path):
     unit = make_unit(tmp_path / "u")
     assert [u.path for u in find_units(unit, tmp_path / "out")] == [unit]

@@ -59,7 +59,7 @@ def test_a_fleet_without_drift_says_so(tmp_path):
 def test_units_to_look_at_lead_to_their_files(tmp_path):
     text, links = text_of(made(), tmp_path / "f")
     assert links[:2] == ["units/key-9.json", "units/key-4.json"]
-    assert "rejected, conforms with probability 0.02" in text and "sigma from the centre" in text
+    assert "rejected, conforms with probability 0.020" in text and "sigma from the centre" in text
 
 
 def test_counts_batches_and_failures_are_told(tmp_path):
