@@ -113,9 +113,10 @@ def main():
     units = [unit_draws(Evidence.read(folder), folder.name) for folder in folders]
     reading, began = time.perf_counter() - began, time.perf_counter()
     pool = pool_batch("simulated", units, 0, LEVEL)
+    pooling = time.perf_counter() - began
     truths = {folder.name: json.loads((folder / "truth.json").read_text(encoding="utf-8")) for folder in folders}
     rows = tally(pool, truths, population())
-    seconds = {"fits_s": fitting, "reading_s_a_unit": reading / len(folders), "pooling_s": time.perf_counter() - began}
+    seconds = {"fits_s": fitting, "reading_s_a_unit": reading / len(folders), "pooling_s": pooling}
     found = {"units": len(pool["units"]), "left_out": pool["left_out"], **seconds, "indicators": rows}
     given.out.mkdir(parents=True, exist_ok=True)
     (given.out / "fits.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

@@ -29,7 +29,7 @@ that cannot be told from none: intervals are too wide there, not too narrow.
 """
 EARLIER = (
     "Lines with a star were computed before units were left out whose prior had moved them by more than a standard deviation; "
-    "in a narrow batch that is one unit in 300, in a wide one none."
+    "in a narrow batch that is one unit in 80, in a wide one none."
 )
 REAL = """## A batch of real fits
 
