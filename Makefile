@@ -1,6 +1,8 @@
 # make demo: set up and run the main job on the packaged data, ending in reports/demo/report.pdf
 # make demo-fleet: set up and evaluate the packaged fleet of twelve units, ending in reports/demo/fleet/report.pdf
 # make test: set up and run the tests
+# make lint: style (ruff) and types (mypy); no error is let through
+# make versions: the wheel with lowest and newest dependencies under Python 3.11 and 3.13 (a quarter of an hour)
 # make docs: set up and build the documentation into build/docs; a warning is an error
 PYTHON ?= python3
 VENV := .venv
@@ -8,7 +10,7 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS := 1
 export MPLBACKEND := Agg
 
-.PHONY: demo demo-fleet test docs lint clean
+.PHONY: demo demo-fleet test docs lint versions clean
 
 demo: $(VENV)/ready
 	$(BIN)/backdrive-bayes demo
@@ -24,8 +26,12 @@ docs: $(VENV)/ready
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 
 lint: $(VENV)/ready
-	$(BIN)/python -m pip install --quiet ruff
+	$(BIN)/python -m pip install --quiet ruff mypy pandas-stubs scipy-stubs
 	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+versions: $(VENV)/ready
+	$(BIN)/python studies/versions.py --out reports/versions
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "Python 3.11 or newer is needed: make PYTHON=python3.11"'

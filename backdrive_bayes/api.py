@@ -28,6 +28,7 @@ from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.limits import Limits, read_limits
 from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.decisions.pool import Pool
+from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators.loads import loads_json
 from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.records import record
@@ -52,7 +53,7 @@ class Unit(record.Unit):
 class Fit:
     """A posterior and its indicators object, of indicators.json's form."""
 
-    posterior: object
+    posterior: Posterior
     indicators: dict
 
     @cached_property
@@ -182,16 +183,16 @@ def fit(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, loads=(), load
     ``loads`` [N·m], arriving at ``load_rate`` [N·m/s] or at every measured rate, are answered under ``indicators["loads"]``.
     BadInput where the check finds the data unfit, unless ``force``, which the result says.
     """
-    given = {} if baseline is None else {"baseline": tuple(baseline)}
-    options = FitOptions(k=k, level=level, seed=seed, loads=tuple(loads), load_rate=load_rate, **given)
+    modules = FitOptions.baseline if baseline is None else tuple(baseline)
+    options = FitOptions(modules, k, level, seed, tuple(loads), load_rate)
     ready = _ready(unit, k, force)
     return _fitted(ready, *fit_unit(ready.unit, options, progress or (lambda text: None)))
 
 
 def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, force=False, progress=None) -> Diagnosis:
     """Where model and measurement part, which effect causes it, and the fit of the model with it, as for :func:`fit`."""
-    given = {} if baseline is None else {"baseline": tuple(baseline)}
-    options, ready = FitOptions(k=k, level=level, seed=seed, **given), _ready(unit, k, force)
+    modules = FitOptions.baseline if baseline is None else tuple(baseline)
+    options, ready = FitOptions(modules, k, level, seed), _ready(unit, k, force)
     result, sampled = diagnose_unit(ready.unit, options, progress or (lambda text: None))
     return Diagnosis(ready.stamp(result), _fitted(ready, *sampled))
 
@@ -207,11 +208,11 @@ def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
     models = list(fitted) if isinstance(fitted, list | tuple) else [fitted]
     name = "" if isinstance(limits, Limits) else Path(limits).name
     limits = limits if isinstance(limits, Limits) else read_limits(limits)
-    evidences, pooled = [_evidence(m, examined=True) for m in models], isinstance(batch, str | Path)
-    others = Pool.read(Path(batch)) if pooled else [_evidence(b) for b in batch]
+    evidences = [_evidence(m, examined=True) for m in models]
+    others = Pool.read(Path(batch)) if isinstance(batch, str | Path) else [_evidence(b) for b in batch]
     result = assess(evidences, limits, probabilities, others) | collected([evidences[0].about])
-    options = {"limits": name, "models": len(models), "batch": others.about["units"] if pooled else [o.name for o in others]}
-    return Verdict(stamped_by(result, evidences[:1], **options))
+    units = others.about["units"] if isinstance(others, Pool) else [other.name for other in others]
+    return Verdict(stamped_by(result, evidences[:1], limits=name, models=len(models), batch=units))
 
 
 def compare(*fitted, claims=None, rope: float = ROPE, seed: int = 0) -> Comparison:
@@ -236,7 +237,7 @@ def report(*results, out: Path | str, template: Path | str | None = None) -> Pat
         own = Path(out) / f"{number}-{type(result).__name__.lower()}"
         folders.append(Path(result) if isinstance(result, str | Path) else result.save(own, figures=False))
     with write_file(Path(out) / NAME) as temporary:
-        write_report(folders, temporary, read_template(template) if template else None)
+        write_report(folders, temporary, read_template(Path(template)) if template else None)
     return Path(out) / NAME
 
 

@@ -89,7 +89,8 @@ def event_grid(path: Path, rated_torque_nm: float, steps_per_leg: int) -> np.nda
     times = [path.time_s[:1]]
     for t0, t1, q0, q1 in zip(path.time_s[:-1], path.time_s[1:], path.torque_nm[:-1], path.torque_nm[1:], strict=True):
         low, high = sorted((q0, q1))
-        near = np.linspace(*np.clip([-0.12 * rated_torque_nm, 0.12 * rated_torque_nm], low, high), steps_per_leg)
+        first, last = np.clip([-0.12 * rated_torque_nm, 0.12 * rated_torque_nm], low, high)
+        near = np.linspace(first, last, steps_per_leg)
         torque = np.unique(np.r_[np.linspace(low, high, steps_per_leg), near])
         share = np.sort((torque - q0) / (q1 - q0))
         times.append(t0 + (t1 - t0) * share[1:])

@@ -32,7 +32,7 @@ class Answer:
     @property
     def top(self) -> str | None:
         """The most probable label."""
-        return max(self.probabilities, key=self.probabilities.get) if self.probabilities else None
+        return max(self.probabilities, key=self.probabilities.__getitem__) if self.probabilities else None
 
 
 def read_answer(path: Path) -> Answer:

@@ -16,7 +16,7 @@ SIMULATED = 2000
 
 def calibration(forecasts: list[dict[str, float]], truths: list[str]) -> dict:
     """Calibration of the top probability and of all of them, and the log score, for one forecast a unit."""
-    top = [max(f, key=f.get) for f in forecasts]
+    top = [max(f, key=f.__getitem__) for f in forecasts]
     entries = [
         (f[label], label == truth) for f, truth in zip(forecasts, truths, strict=True) for label in f if f[label] >= NEGLIGIBLE
     ]

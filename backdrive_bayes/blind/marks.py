@@ -18,7 +18,9 @@ class Mark:
     def judge(self, scores: dict) -> dict:
         """Found and wanted value; ``met`` is None where there was nothing to score."""
         found = self.find(scores)
-        met = None if found is None else (found >= self.least if self.most is None else found <= self.most)
+        met = None
+        if found is not None:
+            met = found <= self.most if self.most is not None else found >= (self.least or 0.0)
         return {"mark": self.name, "least": self.least, "most": self.most, "found": found, "met": met}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from backdrive_bayes.bench.registry import NONE, UNKNOWN
 from backdrive_bayes.blind.answers import Answer
 from backdrive_bayes.blind.case import Case, by_severity
@@ -15,7 +17,7 @@ NEAR = 0.1
 def where_scores(cases: list[Case]) -> dict:
     """Overlap of where, of units with an effect, against both truths; ``with_zeros`` counts a missing map as no overlap."""
     return {
-        name: _where(cases, name) | {"by_severity": by_severity(cases, lambda own, n=name: _where(own, n))}
+        name: _where(cases, name) | {"by_severity": by_severity(cases, functools.partial(_where, truth=name))}
         for name in ("remainder", "effect")
     }
 

@@ -70,7 +70,8 @@ def run(args) -> int:
     with progress() as note, write_folder(out) as folder:
         if made:
             write_json(folder / "diagnosis.json", evidence.diagnosis)
-            keep_fit(*made, folder, not args.no_figures, note)
+            posterior, indicators = made
+            keep_fit(posterior, indicators, folder, not args.no_figures, note)
             retire(out, made[1])
         write_json(folder / "verdict.json", verdict)
         keep_run(folder, "accept", began)
@@ -118,8 +119,8 @@ def _batch(folders: list[Path]):
         return found, [other.name for other in found]
     if len(folders) > 1:
         raise BadInput("--batch", "one pooled batch, or fits of other units", f"{len(folders)} folders, '{pooled[0]}' among them")
-    found = Pool.read(pooled[0])
-    return found, found.about["units"]
+    pool = Pool.read(pooled[0])
+    return pool, pool.about["units"]
 
 
 def _models(given):

@@ -46,7 +46,7 @@ def run(args) -> int:
     if args.workers < 1:
         raise BadInput("--workers", "a number from 1", args.workers)
     with progress() as note:
-        result = run_study(Study(request, out, diagnose_folder, write_json, *again, args.workers, note))
+        result = run_study(Study(request, out, diagnose_folder, write_json, again[0], again[1], args.workers, note))
     stamped(result, {"unit": "blind", "data_sha256": _data_sha256(out)}, args.seed, result["request"])
     write_json(out / NAME, result)
     if not args.no_figures:

@@ -12,11 +12,12 @@ from backdrive_bayes.errors import BadInput
 
 HELP = "check, fit, diagnose, judge and compare the packaged twins and write one PDF, or with --fleet evaluate the packaged fleet"
 UNITS = ("reducer-1", "reducer-2")
+PACKAGED = (Path(__file__).parents[1] / "data").resolve()
 
 
 def add_arguments(parser) -> None:
     """Options of this verb."""
-    parser.add_argument("--data", type=Path, default=Path("data"), help="folder of the packaged units (default data)")
+    parser.add_argument("--data", type=Path, default=PACKAGED, help="folder of the units (default: those of the package)")
     parser.add_argument("--fleet", action="store_true", help="fit the packaged fleet of twelve small units instead")
 
 
@@ -27,7 +28,7 @@ def run(args) -> int:
     """
     out = args.out or Path("reports/demo/fleet" if args.fleet else "reports/demo")
     if not (args.data / UNITS[0]).is_dir():
-        raise BadInput(args.data, "the folder of packaged units (run from the project's folder or give --data)", "none")
+        raise BadInput(args.data, f"a folder with the units {' and '.join(UNITS)}", "none")
     if args.fleet:
         return _fleet(args.data / "fleet", out, args.seed)
     say("The packaged units are synthetic twins of published reducers, not measurements.")

@@ -51,7 +51,8 @@ def run(args) -> int:
         write_json(folder / "diagnosis.json", result)
         keep_run(folder, "diagnose", began)
         if sampled is not None:
-            keep_fit(*sampled, folder, figures=False)
+            posterior, indicators = sampled
+            keep_fit(posterior, indicators, folder, figures=False)
             retire(out, sampled[1])
         if not args.no_figures:
             draw_figures("save_figures", folder)

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.decisions.outcome import FORCED, outcome_of
 from backdrive_bayes.errors import BadInput
+
+if TYPE_CHECKING:
+    from backdrive_bayes.records.record import Unit
 
 
 @dataclass(frozen=True, eq=False)
 class ReadyUnit:
     """A unit as read, without wild samples; ``checked`` is what check_unit says, ``forced`` whether errors were overruled."""
 
-    unit: object
+    unit: Unit
     checked: dict
     forced: bool = False
 

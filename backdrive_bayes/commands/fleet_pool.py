@@ -36,7 +36,7 @@ def pool_fleet(job: Job, units: list[FleetUnit], found: list, client, level: flo
     for unit, (_, _, rows) in zip(units, found, strict=True):
         if rows[0]["status"] == DONE:
             batches[batch_of(rows[0])].append(unit)
-    written = []
+    written: list[Path] = []
     for batch, members in sorted(batches.items()):
         note(f"pooling {len(members)} units of batch '{batch}'", len(written) / len(batches))
         try:

@@ -12,7 +12,7 @@ from pathlib import Path
 try:
     import fcntl
 except ImportError:  # no POSIX: nothing tells a dead process's files from a living one's, and they stay
-    fcntl = None
+    fcntl = None  # type: ignore[assignment]
 
 _OPEN: dict[Path, list[Path]] = {}
 """What this process is writing, and the folders that it made for that, innermost first."""

@@ -40,7 +40,8 @@ class _Shown:
 
     def __init__(self, stream, clock: Clock):
         self.stream, self.clock = stream, clock
-        self.done, self.thread = threading.Event(), None
+        self.done = threading.Event()
+        self.thread: threading.Thread | None = None
 
     def note(self, text: str, share: float | None = None) -> None:
         """What is being done now, and the share of the work that is done."""

@@ -41,7 +41,7 @@ def show_indicators(result: dict) -> None:
     ]
     title = f"Median [{level_text(result['level'])} interval], lost motion δ at ±{result['k']:g} T_r"
     note = "? provisional: not to be used" if provisional else ""
-    show_table([Column(f"record\n{_AT}", False, 17), *map(Column, headings)], rows, title, note)
+    show_table([Column(f"record\n{_AT}", False, 16), *map(Column, headings)], rows, title, note)
     lacking = [r["file"] for r in result["records"] if r["indicators"]["lost_motion_rad"] is None]
     if lacking:
         say(f"δ is not defined where the loop is smaller than ±{result['k']:g} T_r: {', '.join(lacking)}")

@@ -214,12 +214,12 @@ def _global(row, limit: Limit, limits: Limits, batch, lost_motion_at: float, lev
     kept = acceptance_interval(row["sd"], limit.lo, limit.hi, limits.producer) or (np.inf, -np.inf)
     rule = row["sd"], (limit.lo, limit.hi), accepted, kept
     if limit.process is None and isinstance(batch, Pool):
-        process = batch.predictive(limit.indicator, row["loading_rate_Nm_per_s"], row["amplitude_Nm"], lost_motion_at)
-        units, found = process.units, process.risks(*rule, level)
+        pooled = batch.predictive(limit.indicator, row["loading_rate_Nm_per_s"], row["amplitude_Nm"], lost_motion_at)
+        told, units, found = pooled.to_json(), pooled.units, pooled.risks(*rule, level)
     else:
         process, units = (limit.process, 0) if limit.process else _process(limit, row, batch)
-        found = global_risks(process, *rule).to_json()
-    return {"process": process.to_json(), "batch_units": units, "uncertainty": row["sd"], "accepted": accepted} | found
+        told, found = process.to_json(), global_risks(process, *rule).to_json()
+    return {"process": told, "batch_units": units, "uncertainty": row["sd"], "accepted": accepted} | found
 
 
 def _process(limit, row, batch):

@@ -73,7 +73,8 @@ def match(a: Evidence, b: Evidence) -> tuple[list[Matched], list[dict]]:
     A loop within the measured amplitude is the model's prediction; a rate that was not measured is refused, for the baseline
     does not know rates.
     """
-    found, refused = [], []
+    found: list[Matched] = []
+    refused: list[dict] = []
     for own, other, turned in ((a, b, False), (b, a, True)):
         for loop in own.measured:
             try:

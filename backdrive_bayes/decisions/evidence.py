@@ -29,11 +29,25 @@ from backdrive_bayes.results import (
 class Draws(Protocol):
     """What evidence asks of draws; :class:`~backdrive_bayes.indicators.draws.IndicatorDraws` is it for a posterior."""
 
-    rates: np.ndarray
-    amplitudes: np.ndarray
-    rated_torque_nm: float
-    kept: np.ndarray
-    parameters: dict[str, np.ndarray]
+    @property
+    def rates(self) -> np.ndarray:
+        """Loading rates of the records [N·m/s]."""
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        """Amplitudes of the records [N·m]."""
+
+    @property
+    def rated_torque_nm(self) -> float:
+        """The rated torque T_r."""
+
+    @property
+    def kept(self) -> np.ndarray:
+        """Numbers of the kept draws."""
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """Draws of the parameters."""
 
     def values(self, name: str, rate: float, amplitude: float, kept: bool = False) -> np.ndarray:
         """An indicator of a loop, of all or the kept draws."""

@@ -83,7 +83,7 @@ class Expression:
     def asked_of(self, method: str) -> list[str]:
         """Letters of the units of which a quantity is asked, sorted."""
         nodes = (n for n in ast.walk(self.body) if isinstance(n, ast.Attribute) and n.attr == method)
-        return sorted({n.value.id for n in nodes})
+        return sorted({n.value.id for n in nodes if isinstance(n.value, ast.Name)})
 
     def parts(self) -> list[tuple[str, ast.expr, str]]:
         """What stands behind the answer: text, node and unit of every compared quantity and of every tested series."""

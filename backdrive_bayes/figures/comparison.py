@@ -82,7 +82,7 @@ def draw_ratios(comparison: dict, pair: int):
                 if ratio:
                     at = row + (i - 0.5 * (len(both["conditions"]) - 1)) * step
                     _whisker(panel, ratio, at, look, label)
-                    label = None
+                    label = ""
         rope = comparison["rope"]
         panel.axvspan(1 / (1 + rope), 1 + rope, color=GREY, alpha=0.35, linewidth=0)
         panel.axvline(1.0, color="black", linewidth=0.7)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from typing import Any
 
 from backdrive_bayes.figures import diagnosis_closed, diagnosis_map, diagnosis_residual, diagnosis_shift
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
@@ -79,7 +80,8 @@ def draw(saved: Diagnosed):
     )
     with styled():
         figure = new_figure(sum(heights))
-        head, upper, lower = figure.subfigures(3, 1, height_ratios=heights)
+        parts: Any = figure.subfigures(3, 1, height_ratios=heights)
+        head, upper, lower = parts
         _head(head, heights[0], drawable(answer_words(saved), 80), lines)
         which, closed = upper.subplots(1, 2, width_ratios=[1.1, 1])
         _which(which, saved)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import drawable, share_text
 from backdrive_bayes.figures.style import (
@@ -59,7 +61,8 @@ def draw_before_after(axes, saved: Diagnosed, records: list[int]) -> None:
 
 def before_after_handles() -> list:
     """Legend entries of :func:`draw_before_after`."""
-    line, looks = matplotlib.lines.Line2D, {"linestyle": "none", "marker": "o", "markersize": 6}
+    line = matplotlib.lines.Line2D
+    looks: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 6}
     return [
         line([], [], **looks, color=VERMILLION, markerfacecolor="white", markeredgewidth=1.4, label="before"),
         line([], [], **looks, color=BLUE, label="after"),

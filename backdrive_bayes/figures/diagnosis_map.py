@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, BLUE, GREY, VERMILLION, few_ticks, matplotlib, new_figure, styled
@@ -117,7 +118,7 @@ def _cell(axes, cell, box, colour, drawn):
     span, row_in, numbers = drawn
     left, top, width, height = box
     sure = cell.get("credible", True)
-    look = {"facecolor": _MAP(colour)} if sure else {"facecolor": "#ECECEC", "hatch": "////"}
+    look: dict[str, Any] = {"facecolor": _MAP(colour)} if sure else {"facecolor": "#ECECEC", "hatch": "////"}
     edge = "white" if sure else "#B5B5B5"
     axes.add_patch(matplotlib.patches.Rectangle((left, top), width, height, edgecolor=edge, linewidth=0.5, **look))
     sign = "+" if cell["signed_rms_rad"] > 0 else "−"
@@ -145,7 +146,7 @@ def _rows(axes, saved, records):
 
 def add_key(axes) -> None:
     """The legend for cells that may be zero, above the map at the right."""
-    look = {"facecolor": "#ECECEC", "edgecolor": GREY, "hatch": "////", "linewidth": 0.5}
+    look: dict[str, Any] = {"facecolor": "#ECECEC", "edgecolor": GREY, "hatch": "////", "linewidth": 0.5}
     patch = matplotlib.patches.Patch(label="not credibly non-zero", **look)
     axes.legend(handles=[patch], loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1)
 

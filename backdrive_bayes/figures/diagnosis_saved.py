@@ -153,7 +153,8 @@ class Diagnosed:
     def ranked(self, at_most: int = 5) -> list[Hypothesis]:
         """The most probable hypotheses, the whole credible set (ten at most), "unknown" and "none"; the rest in one."""
         inside = {_parts(e) for e in self.credible_set[:10]}
-        shown, rest = [], []
+        shown: list = []
+        rest: list = []
         for i, entry in enumerate(self.hypotheses):
             inner = _parts(entry["effect"]) in inside
             likely = i < at_most and (i < LEADERS or entry["probability"] >= NEGLIGIBLE)

@@ -45,7 +45,7 @@ class Saved:
     def group(self, name: str):
         """A group of the posterior file as an xarray dataset, read once."""
         if name not in self._groups:
-            self._groups[name] = read_group(self.posterior_file, name)
+            self._groups[name] = read_group(Path(self.posterior_file or "posterior.nc"), name)
         return self._groups[name]
 
     def attributes(self) -> dict:

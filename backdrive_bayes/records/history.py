@@ -20,7 +20,8 @@ BINS_PER_SEGMENT = 100
 
 def read_history(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and torque [N·m], shape (samples,) each; BadInput names file, row and what was found."""
-    headers, quantities = [], []
+    headers: list[str] = []
+    quantities: list = []
 
     def choose(found_headers):
         found = [find_column(found_headers, kind, None, str(path)) for kind in ("time", "torque")]

@@ -99,10 +99,10 @@ def _tip_weights(record: Record, segments, edge: int) -> np.ndarray:
 
 def _both_widths(record: Record, segments, k: int) -> np.ndarray | None:
     """Weights (2, samples) of the width between ramps k and k + 1 at zero torque, over a short window and one twice as long."""
-    crossings = [_zero_weights(record, segments[j]) for j in (k, k + 1)]
-    if any(crossing is None for crossing in crossings):
+    before, after = (_zero_weights(record, segments[j]) for j in (k, k + 1))
+    if before is None or after is None:
         return None
-    return segments[k].direction * (crossings[1] - crossings[0])
+    return segments[k].direction * (after - before)
 
 
 def _zero_weights(record: Record, segment) -> np.ndarray | None:

@@ -74,7 +74,8 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
 
 def _mean(parts) -> dict[str, np.ndarray]:
     """Mean of each named array over the parts that have it."""
-    total, count = {}, {}
+    total: dict[str, np.ndarray] = {}
+    count: dict[str, int] = {}
     for part in parts:
         for name, values in part.items():
             if values is not None:

@@ -116,8 +116,8 @@ class _Tip:
 
 
 def _tips(time, torque, angle, branches: tuple[Branch, ...]) -> list[_Tip]:
-    tips = [_tip(time, torque, angle, branch) for branch in branches if branch.label.startswith("load")]
-    tips = [tip for tip in tips if tip is not None]
+    found = [_tip(time, torque, angle, branch) for branch in branches if branch.label.startswith("load")]
+    tips = [tip for tip in found if tip is not None]
     largest = {
         sign: max((abs(tip.torque_nm) for tip in tips if tip.label[-1] == sign), default=0.0) for sign in "+-"
     }

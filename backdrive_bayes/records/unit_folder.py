@@ -64,7 +64,8 @@ def _read_bare(path: Path) -> Unit:
 
 
 def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
-    headers, quantities = [], []
+    headers: list[str] = []
+    quantities: list = []
 
     def choose(found_headers: tuple[str, ...]) -> list[str]:
         found = [find_column(found_headers, kind, entry.columns.get(kind), str(entry.path)) for kind in _KINDS]

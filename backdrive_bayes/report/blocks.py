@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
@@ -57,7 +58,7 @@ class Facts(Block):
     """Pairs of a name and its value."""
 
     kind = "facts"
-    rows: list[tuple[str, str]]
+    rows: Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Table(Block):
 
     kind = "table"
     columns: list[str]
-    rows: list[list[str | list[str]]]
+    rows: Sequence[Sequence[str | Sequence[str]]]
     widths: list[float] = field(default_factory=list)
 
 
@@ -139,11 +140,11 @@ class Chapter:
     """
 
     title: str
-    summary: list[Block]
-    details: list[Block]
+    summary: Sequence[Block]
+    details: Sequence[Block]
     figures: dict[str, Any]
-    pages: list[Block] = field(default_factory=list)
+    pages: Sequence[Block] = field(default_factory=list)
     outcome: str = ""
     provisional: bool = False
     about: About | None = None
-    terms: list[Block] = field(default_factory=list)
+    terms: Sequence[Block] = field(default_factory=list)

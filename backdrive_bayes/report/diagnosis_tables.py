@@ -55,7 +55,7 @@ def probabilities(saved: Diagnosed) -> list:
 
 def effect_parameters(saved: Diagnosed) -> list:
     """Parameters of the effects that are named, each with its interval and unit."""
-    blocks = []
+    blocks: list = []
     for entry in [] if saved.inconclusive else saved.answered():
         found = entry.get("parameters") or {}
         lines = [_parameter(saved, n, about) for n, about in found.items() if not own_of_a_record(n)]

@@ -94,7 +94,8 @@ def next_test(saved: Diagnosed) -> list:
     test = saved.result.get("next_test")
     if not test or (test.get("expected_entropy_drop_bits") or 1.0) < LEAST_BITS:
         return []
-    rows = [("Separates", free(", ".join(label_words(e) for e in test.get("separates") or []) or "not recorded"))]
+    separates = ", ".join(label_words(e) for e in test.get("separates") or []) or "not recorded"
+    rows: list[tuple[str, str]] = [("Separates", free(separates))]
     if test.get("expected_entropy_drop_bits") is not None:
         drop = significant(test["expected_entropy_drop_bits"], 2)
         rows.append(("Expected gain", f"{drop} bit less uncertainty about the cause"))

@@ -22,7 +22,7 @@ def indicators(saved, at_most: int | None = None) -> list:
     """Tables of the indicators, three records side by side."""
     records, labels = saved.records[:at_most], record_labels(saved.records)
     level, k = level_text(saved.indicators["level"]), saved.indicators["k"]
-    blocks = []
+    blocks: list = []
     for part in parts(list(zip(labels, records, strict=False)), PER_FIGURE):
         rows = [
             [name, unit, *(indicator_text(key, r, factor) for _, r in part)]

@@ -56,8 +56,8 @@ def _require_one_unit(folder: Path) -> None:
     path = folder / "posterior.nc"
     if "indicators.json" in found and path.exists():
         require_own_posterior(path, read_groups(path)["posterior"].attrs, found["indicators.json"])
-    about = next(iter(found.values()), None)
     for name, result in found.items():
+        about = next(iter(found.values()))
         # A verdict rests on the fit, whichever version made that.
         require_same_data(folder / name, result, about, version=name == "diagnosis.json" and "indicators.json" in found)
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from msgspec import inspect
+from typing import Any, get_args, get_type_hints
 
 from backdrive_bayes.schemas.check_json import CheckFile
 from backdrive_bayes.schemas.comparison_json import ComparisonFile
@@ -23,8 +21,7 @@ FILES = (
 
 def schema_of(shape: type) -> str:
     """The value of ``schema`` in files of a shape."""
-    kinds = {f.name: f.type for f in inspect.type_info(shape).fields}
-    return kinds["schema"].values[0]
+    return get_args(get_type_hints(shape)["schema"])[0]
 
 
 SHAPES = {schema_of(shape): shape for shape in FILES}

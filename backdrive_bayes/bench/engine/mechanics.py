@@ -9,12 +9,12 @@ import numpy as np
 
 from backdrive_bayes.bench.engine import reducer as reducers
 from backdrive_bayes.bench.engine.clock import make_steps
-from backdrive_bayes.bench.engine.effect import Run
+from backdrive_bayes.bench.engine.effect import EngineEffect, Run
 from backdrive_bayes.bench.engine.reducer import EngineReducer
 from backdrive_bayes.bench.engine.registry import EFFECTS, UNLISTED
 from backdrive_bayes.bench.engine.rows import load_engine
 from backdrive_bayes.bench.engine.simulate import train_angle
-from backdrive_bayes.bench.protocol import BenchEffect, Circumstances, DrawEffect
+from backdrive_bayes.bench.protocol import Circumstances, DrawEffect
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class EngineMechanics:
         load_engine()
         return reducers.draw_reducer(rng, kind, without)
 
-    def angle(self, reducer: EngineReducer, effects: tuple[BenchEffect, ...], where: Circumstances, time_s) -> np.ndarray:
+    def angle(self, reducer: EngineReducer, effects: tuple[EngineEffect, ...], where: Circumstances, time_s) -> np.ndarray:
         """Angle [rad] as read at ``time_s`` [s], shape (samples,); what has strength 0 is absent."""
         effects = tuple(e for e in effects if e.strength != 0.0)
         steps = make_steps(where.path, reducer.rated_torque_nm, self.refine)

@@ -60,9 +60,9 @@ def read(path: Path, choose: Choose) -> Columns:
         fallback = BadInput(path, "columns of finite numbers", str(error))
         raise culprit(path, dialect, wanted) or fallback from error
     finite = all(np.isfinite(value).all() for value in values)
-    error = None if even and finite else culprit(path, dialect, wanted)
-    if error is not None or not finite:
-        raise error or BadInput(path, "columns of finite numbers", "a value that is not")
+    fault = None if even and finite else culprit(path, dialect, wanted)
+    if fault is not None or not finite:
+        raise fault or BadInput(path, "columns of finite numbers", "a value that is not")
     return Columns(tuple(values), first_row=dialect.lines_above + 1, notes=dialect.notes)
 
 

@@ -21,6 +21,7 @@ _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f
 _MATRIX, _COMPRESSED = 14, 15
 _STRUCT, _NUMERIC, _COMPLEX = 2, range(6, 16), 0x0800
 _MOST_DEPTH, _MOST_LEAVES = 4, 5000
+_NOTHING = memoryview(b"")
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,8 @@ def is_level_5(start: bytes) -> bool:
 
 def leaves(data: bytes) -> list[Leaf]:
     """All real numeric arrays of a file; ValueError where its bytes contradict each other."""
-    order, found, inflated = _ORDERS[bytes(data[126:128])], [], 0
+    order, inflated = _ORDERS[bytes(data[126:128])], 0
+    found: list[Leaf] = []
     for kind, content in _elements(memoryview(data)[HEADER_BYTES:], order):
         if kind == _COMPRESSED:
             whole = _inflated(content, limits.MAX_INFLATED_BYTES - inflated)
@@ -98,7 +100,7 @@ def _collect(view: memoryview, order: str, prefix: str, depth: int, found: list[
     if kind == _STRUCT and math.prod(shape) == 1 and depth < _MOST_DEPTH:
         _collect_fields(parts, order, name, depth, found)
     elif kind in _NUMERIC and not flags & _COMPLEX:
-        number, content = next(parts, (0, None))
+        number, content = next(parts, (0, _NOTHING))
         if number in _NUMBERS and len(content) % np.dtype(_NUMBERS[number]).itemsize == 0:
             found.append(Leaf(name, shape, order + _NUMBERS[number], content))
     if len(found) > _MOST_LEAVES:
@@ -113,13 +115,13 @@ def _shape(content: memoryview, order: str) -> tuple[int, ...]:
 
 
 def _collect_fields(parts, order: str, name: str, depth: int, found: list[Leaf]) -> None:
-    length, names = next(parts, (0, b""))[1], next(parts, (0, b""))[1]
+    length, names = next(parts, (0, _NOTHING))[1], next(parts, (0, _NOTHING))[1]
     size = int(np.frombuffer(length[:4], f"{order}i4")[0]) if len(length) >= 4 else 0
     if not 0 < size <= 1024 or len(names) % size:
         raise ValueError(f"a structure of {len(names)} bytes of names, {size} each")
     for at in range(0, len(names), size):
         field = bytes(names[at : at + size]).split(b"\0")[0].decode("utf-8", "replace")
-        kind, content = next(parts, (0, b""))
+        kind, content = next(parts, (0, _NOTHING))
         if kind != _MATRIX:
             raise ValueError(f"no matrix for field '{field}'")
         if len(content):

@@ -79,7 +79,8 @@ def _datasets(file) -> list:
     """All datasets of a file and of its structures, named 'structure.field'; links that leave the file are not followed."""
     import h5py
 
-    found, waiting = [], [("", file, 0)]
+    found: list = []
+    waiting = [("", file, 0)]
     while waiting:
         prefix, group, depth = waiting.pop()
         local = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink) and name != "#refs#"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class HardeningStiffness(ContactEffect):
         return self._with_teeth(chain, deflection)
 
     def _rounder(self, chain: Chain, deflection):
-        changed = {}
+        changed: dict[str, Any] = {}
         for side in ("up", "down"):
             touch, stiff, power = (getattr(chain, f"{name}_{side}") for name in ("open", "stiff", "power"))
             before, after = (contact_stiffness(touch, p, chain.film, deflection) for p in (power, power + 0.5 * self.strength))
@@ -39,12 +40,13 @@ class HardeningStiffness(ContactEffect):
     def _with_teeth(self, chain: Chain, deflection):
         knees = np.array(self.knees if self.law == "teeth" else self.knees[:1])
         bare = np.zeros((deflection.size, knees.size))
-        more = {"mu": bare, "tangential": bare}
+        more: dict[str, Any] = {"mu": bare, "tangential": bare}
         for side in ("up", "down"):
             touch, stiff = getattr(chain, f"open_{side}"), getattr(chain, f"stiff_{side}")
             more[f"open_{side}"] = touch.min(axis=1, keepdims=True) + deflection[:, None] * knees
             more[f"stiff_{side}"] = bare + self.strength * stiff.sum(axis=1, keepdims=True) / knees.size
-        return chain._replace(**{name: np.hstack([getattr(chain, name), added]) for name, added in more.items()})
+        wider: dict[str, Any] = {name: np.hstack([getattr(chain, name), added]) for name, added in more.items()}
+        return chain._replace(**wider)
 
 
 def draw(rng, reducer):
