@@ -61,8 +61,8 @@ def _overhead(repeats, rounds, fitted):
         f"| a plain loop | {wall:.0f} | {cpu:.0f} | – | {6e4 / wall:.0f} |",
         *(f"| a fleet, {n} worker{'s'[: n > 1]} | {_wall(r):.0f} | {_work(r):.0f} | {_rest(r):.0f} | {6e4 / _wall(r):.0f} |"
           for n, r in ((1, one), (2, two))), "",
-        f"- Two workers are {speedup:.2f} times as fast as one: efficiency {speedup / 2:.2f} by wall time, under a load that leaves",
-        "  a second process a share of its own.",
+        f"- Two workers are {speedup:.2f} times as fast as one: efficiency {speedup / 2:.2f} by wall time, under a load that",
+        "  leaves a second process a share of its own.",
         f"- Without other work two things would limit it: beside a second worker the work takes {slowed:.2f} times the processor",
         f"  time, and a worker waits {gap:.1f} ms (median) from one unit of {task:.0f} ms to the next. Efficiency from these: "
         f"{min(1.0, 1 / slowed) * task / (task + gap):.2f}.",
@@ -79,7 +79,7 @@ def _real(fitted):
         "|---|---|---|---|---|---|",
         *(f"| {n} | {r.units} | {w:.1f} | {c:.1f} | {60 / w:.1f} | {_thirds(r)} |"
           for (n, r), w, c in zip(fitted.items(), wall, cpu, strict=True)), "",
-        f"Efficiency of two workers: {wall[0] / wall[1] / 2:.2f} by wall time under that load; beside a second one a fit takes",
+        f"Efficiency of two workers: {wall[0] / wall[1] / 2:.2f} by wall time under that load; beside a second a fit takes",
         f"{cpu[1] / cpu[0]:.2f} times the processor time, which makes {min(1.0, cpu[0] / cpu[1]):.2f}.", "",
     ]  # fmt: skip
 

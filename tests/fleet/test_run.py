@@ -234,6 +234,15 @@ def test_workers_that_die_while_they_start_are_replaced(fleet, tmp_path, two_wor
     two_workers.wait_for_workers(2, timeout=30)
 
 
+def test_workers_that_are_given_up_are_started_anew(two_workers):
+    """Dask gives a worker up where it dies at the wrong moment of its start."""
+    keepers = two_workers.cluster.workers
+    for keeper in list(keepers.values()):
+        two_workers.cluster.sync(keeper.close)
+    assert not any(keeper.status.name == "running" for keeper in keepers.values())
+    two_workers.wait_for_workers(2, timeout=30)
+
+
 def test_results_that_are_lost_with_their_worker_are_asked_for_again(fleet, tmp_path, two_workers, undisturbed):
     killed = []
 
