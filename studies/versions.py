@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import platform
 import re
 import shutil
@@ -24,6 +25,7 @@ SUBSET = (
     "tests/commands/test_screen.py",
 )  # fmt: skip
 SHOWN = ("numpy", "scipy", "emcee", "arviz-stats", "xarray", "h5py", "numba", "pandas", "msgspec", "rich", "pyarrow")
+ROW = "row.json"
 HEAD = """# Versions
 
     python studies/versions.py --out reports/versions
@@ -40,14 +42,18 @@ def main():
     """Run all environments and write README.md; exit code 1 where one fails."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, help="folder for README.md (default: none is written)")
-    parser.add_argument("--only", choices=("lowest", "newest"), help="one kind of environment")
+    parser.add_argument("--only", choices=("lowest", "newest"), help="one kind of environment; --room may hold the other")
     parser.add_argument("--room", type=Path, help="folder to work in (default: a temporary one)")
     options = parser.parse_args()
     room = (options.room or Path(tempfile.mkdtemp(prefix="versions-"))).resolve()
     room.mkdir(exist_ok=True)
     wheel = _build(room)
     kinds = [("lowest", PYTHONS[0]), *(("newest", python) for python in PYTHONS)]
-    rows = [_environment(room, wheel, kind, python) for kind, python in kinds if options.only in (None, kind)]
+    for kind, python in kinds:
+        if options.only in (None, kind):
+            row = _environment(room, wheel, kind, python)
+            (room / f"{kind}-{python}" / ROW).write_text(json.dumps(row))
+    rows = [json.loads(path.read_text()) for path in sorted(room.glob(f"*/{ROW}"))]
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "README.md").write_text(_readme(rows, wheel), encoding="utf-8")
