@@ -6,8 +6,8 @@ import io
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from backdrive_bayes.errors import MissingExtra
-from backdrive_bayes.fleet.store import read_stored, result_path, write_whole
+from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.fleet.store import CannotKeep, read_stored, result_path, write_whole
 from backdrive_bayes.fleet.units import FleetUnit
 
 NAME = "fleet.parquet"
@@ -26,7 +26,10 @@ def rows_of(out: Path, unit: FleetUnit) -> list[dict]:
 
 
 def compact(out: Path, units: list[FleetUnit]) -> int:
-    """Write the table of all results in ``out`` in one step, in order of the units; returns the number of rows."""
+    """Write the table of all results in ``out`` in one step, in order of the units; returns the number of rows.
+
+    Raises BadInput where it cannot be written.
+    """
     pa, parquet = require_pyarrow()
     kinds: dict[str, str] = {}
     for row in _all(out, units):
@@ -40,7 +43,10 @@ def compact(out: Path, units: list[FleetUnit]) -> int:
         for rows in _batches(_all(out, units)):
             writer.write_table(pa.Table.from_pylist(rows, schema=schema))
             count += len(rows)
-    write_whole(Path(out) / NAME, buffer.getvalue())
+    try:
+        write_whole(Path(out) / NAME, buffer.getvalue())
+    except CannotKeep as error:
+        raise BadInput(Path(out) / NAME, "room for the table", f"{error}; results of units are kept") from None
     return count
 
 

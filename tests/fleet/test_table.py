@@ -1,10 +1,12 @@
 """The Parquet table: what result files hold, a row a unit and record, with a type a column."""
 
+import contextlib
 import json
 
 import pytest
 from support.fleet_units import row
 
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.fleet.store import DONE, FAILED, locked, read_stored, result_path, write_result
 from backdrive_bayes.fleet.table import NAME, compact
 from backdrive_bayes.fleet.units import FleetUnit
@@ -54,6 +56,20 @@ def test_every_number_is_that_of_the_result_file(out, tmp_path):
     for unit, found in zip(units, table, strict=True):
         saved = read_stored(out, unit)["rows"][0]
         assert {key: found[key] for key in saved} == saved
+
+
+def test_a_table_that_has_no_room_is_said_and_the_old_one_stays(small_disk, tmp_path):
+    room, _ = small_disk
+    with locked(room / "out"):
+        units = kept(room / "out", tmp_path, {"u": [row("u")], "v": [row("v")]})
+        compact(room / "out", units[:1])
+        before = (room / "out" / NAME).read_bytes()
+        with contextlib.suppress(OSError), open(room / "ballast", "wb", buffering=0) as ballast:
+            while ballast.write(b"x" * 4096):
+                pass
+        with pytest.raises(BadInput, match="room for the table.*No space left"):
+            compact(room / "out", units)
+        assert (room / "out" / NAME).read_bytes() == before and not list((room / "out").glob("*.part"))
 
 
 def test_results_of_units_that_are_no_more_stay_out(out, tmp_path):
