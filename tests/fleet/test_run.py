@@ -201,6 +201,14 @@ def test_a_scheduler_that_is_not_there_is_said(monkeypatch):
             pass
 
 
+def test_a_scheduler_without_workers_is_said(monkeypatch):
+    monkeypatch.setattr(cluster, "WAIT_S", 1)
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty:
+        with pytest.raises(BadInput, match="a scheduler with workers"), cluster.joined(empty.scheduler_address):
+            pass
+
+
 def test_a_run_that_is_killed_twice_goes_on_where_it_stood(fleet, tmp_path, two_workers, undisturbed):
     out = tmp_path / "out"
     for least in (1, 3):
