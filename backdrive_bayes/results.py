@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import hashlib
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -49,14 +52,30 @@ def read_group(path: Path, group: str):
     """One group of a posterior file as an xarray dataset in memory; BadInput where the file is not one of ours."""
     import xarray
 
-    try:
-        with xarray.open_dataset(path, group=group, engine="h5netcdf") as dataset:
-            loaded = dataset.load()
-    except UNREADABLE as error:
-        raise BadInput(path, f"a posterior.nc with group '{group}'", f"unreadable file ({type(error).__name__})") from None
+    fault = ""
+    with _forgetting_quietly():
+        try:
+            with xarray.open_dataset(path, group=group, engine="h5netcdf") as dataset:
+                loaded = dataset.load()
+        except UNREADABLE as error:
+            fault = type(error).__name__
+        if fault:
+            gc.collect()
+    if fault:
+        raise BadInput(path, f"a posterior.nc with group '{group}'", f"unreadable file ({fault})")
     if loaded.attrs.get("schema") != POSTERIOR:
         raise BadInput(path, f"schema '{POSTERIOR}'", repr(loaded.attrs.get("schema")))
     return loaded
+
+
+@contextlib.contextmanager
+def _forgetting_quietly():
+    """h5netcdf closes a file that it could not open when it is forgotten, fails, and says so on standard error."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
 
 
 def read_groups(path: Path) -> dict:

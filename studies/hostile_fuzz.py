@@ -26,7 +26,7 @@ def mutated(name: str, data: bytes, generator: np.random.Generator) -> bytes:
         return lzma.compress(_damage(lzma.decompress(data), generator, True))
     if inner and name.endswith(".xlsx"):
         return _damaged_archive(data, generator)
-    return _damage(data, generator, name.endswith((".csv", ".toml")))
+    return _damage(data, generator, name.endswith((".csv", ".toml", ".json")))
 
 
 def _damaged_archive(data: bytes, generator) -> bytes:

@@ -13,8 +13,10 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
+import contextlib
 import dataclasses
 import importlib
+import io
 import resource
 import shutil
 import signal
@@ -28,6 +30,8 @@ from hostile_formats import FORMATS, TEXTS, loop, write
 from hostile_fuzz import mutated
 from hostile_report import readme
 
+RESULTS = ("posterior.nc", "indicators.json")
+"""Files that verbs write and read again."""
 MOST_SECONDS, MOST_BYTES = 10.0, 1_000_000_000
 LONGEST_LINE = 4000
 PRELOADED = (
@@ -118,7 +122,7 @@ def run_corpus(room: Path, note) -> list[dict]:
 def run_fuzz(room: Path, count: int, seed: int, note) -> list[dict]:
     """``count`` mutated inputs, the formats and text files in turn; input ``n`` depends on the seed and n alone."""
     sound = in_child(_sound, _clean(room / "sound"))
-    names, rows = [*FORMATS, "history.csv", *TEXTS], []
+    names, rows = [*FORMATS, "history.csv", *TEXTS, *RESULTS], []
     for number in range(count):
         name = names[number % len(names)]
         folder = _clean(room / "fuzz")
@@ -139,6 +143,11 @@ def _sound(folder: Path) -> dict[str, bytes]:
     columns = loop(samples_per_ramp=120)
     found = {name: write(folder / name, *columns).read_bytes() for name in FORMATS}
     found["history.csv"] = found["plain.csv"]
+    from backdrive_bayes.commands.main import main
+
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        main(["fit", str(folder / "plain.csv"), "-o", str(folder / "fit"), "--no-figures"])
+    found |= {name: (folder / "fit" / name).read_bytes() for name in RESULTS}
     return found | {name: text.replace("{file}", "a.csv").encode() for name, text in TEXTS.items()}
 
 
@@ -153,6 +162,11 @@ def _arguments(name: str, data: bytes, folder: Path) -> list[str]:
         return ["report", str(folder / "none"), "--template", str(folder), *out]
     if name == "history.csv":
         return ["predict", str(folder / "none.nc"), str(folder / name), *out]
+    if name == "posterior.nc":
+        (folder / "history.csv").write_text("time_s,torque_Nm\n0,0\n1,0.5\n2,0\n")
+        return ["predict", str(folder / name), str(folder / "history.csv"), *out]
+    if name == "indicators.json":
+        return ["report", str(folder), *out]
     if name == "unit.toml":
         write(folder / "a.csv", *loop(samples_per_ramp=60))
         return ["check", str(folder), *out]

@@ -1,6 +1,8 @@
 """A posterior goes through its file unchanged, opens in ArviZ, and a file that was harmed is one line."""
 
+import gc
 import json
+import re
 import warnings
 
 import numpy as np
@@ -135,3 +137,17 @@ def test_no_file_and_no_netcdf_are_one_line(tmp_path):
     (tmp_path / "bad.nc").write_bytes(b"no hdf5")
     with pytest.raises(BadInput, match="bad.nc"):
         read_posterior(tmp_path / "bad.nc")
+
+
+@pytest.mark.parametrize("header", [0, 1, 2])
+def test_a_damaged_header_is_one_line_and_nothing_beside_it(posterior, path, tmp_path, header):
+    """What fails while a half-open file is forgotten would be written to standard error, and is an error of this test."""
+    data = bytearray(path.read_bytes())
+    at = [match.start() for match in re.finditer(b"OHDR", data)][header]
+    data[at + 8 : at + 40] = b"\xff" * 32
+    broken = tmp_path / "broken.nc"
+    broken.write_bytes(data)
+    with pytest.raises(BadInput, match="broken.nc: expected") as refused:
+        read_posterior(broken)
+    del refused
+    gc.collect()
