@@ -27,10 +27,6 @@ given in a unit's usual standard deviation. Numbers are shares of 90 % intervals
 Mean and spread keep to the lower bound in {held} of {lines} lines. Above the upper bound are batches of five units, and spreads
 that cannot be told from none: intervals are too wide there, not too narrow.
 """
-EARLIER = (
-    "Lines with a star were computed before units were left out whose prior had moved them by more than a standard deviation; "
-    "in a narrow batch that is one unit in 80, in a wide one none."
-)
 REAL = """## A batch of real fits
 
 `python studies/batch_pooling_fits.py --keep FOLDER`: {units} virtual reducers measured once, every third on a bench with much
@@ -58,10 +54,10 @@ def coverage_lines(cells: list[dict]) -> list[str]:
     low, high = sound[0]["bounds"]
     held = sum(c["holds"] for c in sound)
     text = SIMULATED.format(batches=sound[0]["batches"], low=low, high=high, held=held, lines=len(sound))
-    found = [f"{c['fault']}{_star(c)}, {c['units']} units, spread {c['ratio']:g}: {_shares(c)}" for c in faulty]
+    found = [f"{c['fault']}, {c['units']} units, spread {c['ratio']:g}: {_shares(c)}" for c in faulty]
     return [
         *text.splitlines(), "", *table(SIMULATED_COLUMNS, map(_cell, sound)), "",
-        "Refused: batches / units in all.", *([EARLIER] if any(c.get("earlier") for c in cells) else []), "",
+        "Refused: batches / units in all.", "",
         "Planted faults, with the coverage of mean and spread and whether it falls below the bound:", "",
         *(f"- {line}" for line in found), "",
     ]  # fmt: skip
@@ -71,14 +67,10 @@ def _shares(c) -> str:
     return f"{c['mean']:.3f} and {c['spread']:.3f}, {'not found out' if c['holds'] else 'found out'}"
 
 
-def _star(c) -> str:
-    return " \\*" if c.get("earlier") else ""
-
-
 def _cell(c) -> list[str]:
     shares = [f"{c[key]:.3f}" for key in ("mean", "spread", "next", "of_units")]
     refused = f"{c['refused']} / {c['units_refused']}"
-    return [f"{c['units']}{_star(c)}", f"{c['ratio']:g}", *shares, f"{c['narrower']:.2f}", refused, f"{c['loss_bits']:.4f}"]
+    return [str(c["units"]), f"{c['ratio']:g}", *shares, f"{c['narrower']:.2f}", refused, f"{c['loss_bits']:.4f}"]
 
 
 def fits_lines(found: dict) -> list[str]:
