@@ -32,6 +32,11 @@ UNREADABLE = (OSError, ValueError, LookupError, RuntimeError, TypeError, Attribu
 """What the readers of HDF5 raise on a damaged file."""
 
 
+def usable(result: dict) -> bool:
+    """Whether the numbers of a fit or a diagnosis may be used: it came out, and the data were not forced."""
+    return not result["outcome"]["exit_code"] and not result.get("forced", False)
+
+
 def read_result(path: Path, schema: str) -> dict:
     """A result file's object; BadInput where it is missing, no JSON, of another schema, or lacks a key of it."""
     try:

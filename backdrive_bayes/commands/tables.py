@@ -8,6 +8,7 @@ import re
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.screen import Column, show_table, width
 from backdrive_bayes.number_text import interval_text, level_text, probability_text
+from backdrive_bayes.results import usable
 
 ARCMIN_PER_RAD = 10800.0 / math.pi
 ONE_LINE = 110
@@ -30,7 +31,7 @@ _CONTRASTS = {"greater": ">", "less": "<", "equivalent": "≈", "undecided": "?"
 
 def show_indicators(result: dict) -> None:
     """δ, w(0), S and u of an indicators object, a row a record; of one that has not converged every number is marked."""
-    provisional = result["outcome"]["word"] != "converged"
+    provisional = not usable(result)
     areas = [abs(r["indicators"]["loop_area_J"]["median"]) for r in result["records"]]
     energy, per_joule = _in_prefix("J", max(areas))
     scales = (ARCMIN_PER_RAD, ARCMIN_PER_RAD, per_joule, 1.0)

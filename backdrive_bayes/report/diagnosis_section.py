@@ -14,6 +14,7 @@ from backdrive_bayes.report.blocks import Banner, Block, Chapter, Facts, Heading
 from backdrive_bayes.report.diagnosis_text import TERMS, next_test, outcome, verdict
 from backdrive_bayes.report.findings import findings_blocks, warned
 from backdrive_bayes.report.text import Free, free
+from backdrive_bayes.results import usable
 
 LISTED = 4
 """Records that the summary names."""
@@ -39,7 +40,7 @@ def chapter(folder: Path) -> Chapter:
         figures,
         outcome=", ".join(filter(None, [outcome(saved), warned(saved.result)])),
         terms=[Heading("Diagnosis"), Facts(TERMS)] if saved.result["which"] else [],
-        provisional=bool(saved.result["outcome"]["exit_code"]),
+        provisional=not usable(saved.result),
     )
 
 

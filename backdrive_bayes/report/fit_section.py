@@ -24,6 +24,7 @@ from backdrive_bayes.report.classic_tables import least_squares
 from backdrive_bayes.report.findings import findings_blocks, warned
 from backdrive_bayes.report.parameter_tables import meanings, parameters
 from backdrive_bayes.report.text import digests, free
+from backdrive_bayes.results import usable
 
 ON_SUMMARY = 2 * PER_FIGURE
 """Records whose indicators fit on the summary page."""
@@ -55,7 +56,7 @@ def chapter(folder: Path) -> Chapter:
         [*(Picture(name, caption(name, level), spilt=True) for name in shown), *_details(saved, rest)],
         figures,
         outcome=", ".join(filter(None, [_outcome(saved), warned(saved.indicators)])),
-        provisional=bool(saved.indicators["outcome"]["exit_code"]),
+        provisional=not usable(saved.indicators),
         terms=[Heading("Parameters and sampling"), Note(meanings(saved)), Note(tables.CRITERIA)],
         about=_about(saved),
     )
@@ -94,10 +95,10 @@ def _verdict(saved):
         f"{fixed(found['min_bulk_ess'], 0)} (bulk) and {fixed(found['min_tail_ess'], 0)} (tail)."
     )
     outcome = saved.indicators["outcome"]
-    if not outcome["exit_code"]:
+    if usable(saved.indicators):
         return Banner("good", f"{outcome['word'].upper()}: the intervals may be used", numbers)
-    text = f"Do not use these intervals: {free(outcome['reason'], 600).rstrip('.')}. {numbers}"
-    return Banner("bad", outcome["word"].upper(), text)
+    why = "; ".join(filter(None, [outcome["caveat"], outcome["reason"]]))
+    return Banner("bad", outcome["word"].upper(), f"Do not use these intervals: {free(why, 600).rstrip('.')}. {numbers}")
 
 
 def _identity(saved):

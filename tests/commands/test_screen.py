@@ -15,7 +15,7 @@ from backdrive_bayes.decisions.comparison import compare
 from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.number_text import interval_text
 
-CONVERGED, NOT = {"word": "converged"}, {"word": "inconclusive"}
+CONVERGED, NOT = {"word": "converged", "exit_code": 0}, {"word": "inconclusive", "exit_code": 4}
 
 
 def shown(capsys):
@@ -41,14 +41,15 @@ def test_every_indicator_stands_in_a_row_of_its_record(columns, capsys, monkeypa
         assert max(map(len, text.splitlines())) <= 80
 
 
-def test_what_has_not_converged_is_marked_number_by_number(capsys):
+def test_what_is_not_to_be_used_is_marked_number_by_number(capsys):
     result = fitted()
     tables.show_indicators(result)
     assert "?" not in shown(capsys)
-    tables.show_indicators(fitted(outcome=NOT))
-    text = shown(capsys)
     defined = sum(record["indicators"][name] is not None for record in result["records"] for name in tables._SHOWN)
-    assert text.count("? [") == defined > 0 and "provisional: not to be used" in text
+    for changes in ({"outcome": NOT}, {"forced": True}):
+        tables.show_indicators(fitted(**changes))
+        text = shown(capsys)
+        assert text.count("? [") == defined > 0 and "provisional: not to be used" in text
 
 
 def test_a_lost_motion_that_is_not_defined_is_said(capsys):

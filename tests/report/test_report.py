@@ -153,6 +153,8 @@ def test_what_the_check_found_and_was_overruled_stands_on_the_first_page(tmp_pat
     (tmp_path / "posterior.nc").unlink()
     page = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path]))), 0)
     assert "FORCED: unfit data" in page and "warning, a.csv: the rated torque is 1000 times" in page and "closes well" not in page
+    assert "Do not use these intervals: Forced" in page or "Do not use these intervals: forced" in page
+    assert "PROVISIONAL" in page.upper() and "Signature" not in page
 
 
 def test_the_summary_stays_on_one_page_whatever_the_unit_says(tmp_path):
