@@ -98,7 +98,8 @@ def _verdict(saved):
     if usable(saved.indicators):
         return Banner("good", f"{outcome['word'].upper()}: the intervals may be used", numbers)
     why = "; ".join(filter(None, [outcome["caveat"], outcome["reason"]]))
-    return Banner("bad", outcome["word"].upper(), f"Do not use these intervals: {free(why, 600).rstrip('.')}. {numbers}")
+    title = f"{outcome['word'].upper()}{', but forced' * saved.indicators.get('forced', False)}"
+    return Banner("bad", title, f"Do not use these intervals: {free(why, 600).rstrip('.')}. {numbers}")
 
 
 def _identity(saved):

@@ -143,7 +143,7 @@ def test_not_converged_is_inconclusive_with_advice(tmp_path):
     (tmp_path / "posterior.nc").unlink()
     page = text_of(pypdf.PdfReader(report.write_report([tmp_path], tmp_path / "out" / "r.pdf")), 0)
     assert "INCONCLUSIVE" in page and "give it more time" in page and "Do not use" in page
-    assert "not converged – provisional" in page and "Signature" not in page
+    assert "provisional – not to be used" in page and "Signature" not in page
 
 
 def test_what_the_check_found_and_was_overruled_stands_on_the_first_page(tmp_path):
