@@ -37,7 +37,7 @@ SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 def weigh_unit(folder: Path, truth: dict) -> dict:
     """What a diagnosis rests on for one unit, ready for JSON, with the answer that is right."""
     weighed = weigh(prepare(read_unit(folder)))
-    found = find_properties(weighed.linear, np.random.default_rng(0))
+    found = find_properties(weighed, np.random.default_rng(0))
     return {
         "answer": sorted({"unknown" if e.startswith("x_") else e for e in truth["effects"]}),
         "effects": truth["effects"],

@@ -16,7 +16,6 @@ from scipy.special import logsumexp
 
 from backdrive_bayes.engine.design import Design, Group
 from backdrive_bayes.engine.linearise import Linear
-from backdrive_bayes.engine.marginal import whiten
 
 WIDENED = 5.0
 SIZES = np.exp([-1.5, 0.0, 1.5])
@@ -67,7 +66,7 @@ def make_contrasts(linear: Linear, groups: tuple[Group, ...]) -> Contrasts:
     core = [i for i, n in enumerate(linear.design.names) if n in _class_names(linear)]
     effects = tuple(g for i, g in enumerate(linear.design.groups) if i not in core) + groups
     design = Design(effects)
-    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    data = linear.whitened(design)
     own = np.isin(linear.design.index, core)
     scale = WIDENED * np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index[own]]
     inner = linear.data.gram[np.ix_(own, own)] * np.outer(scale, scale)

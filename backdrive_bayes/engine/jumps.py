@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logsumexp
 
 from backdrive_bayes.engine.linearise import Linear
 
@@ -17,6 +18,8 @@ STEEP = 6.0
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)
 SIZES = (3.0, 6.0, 12.0, 24.0)
 """Shares of instants with a jump, and jump sizes in noise standard deviations, that are averaged over."""
+STRAY = 1e-3
+"""Share of instants at which something else moves the angle either way."""
 FEWEST = 6
 """Jumps below which there is no stick-slip but single events."""
 LARGE = 5.0
@@ -41,11 +44,11 @@ def find_jumps(linear: Linear) -> Jumps:
     Leaps that come at the same torque on other legs are steps of the operator (teeth that engage) and no stick-slip.
     """
     leaps, sizes, places = [], [], []
-    scale = linear.reduced.torque_scale_nm
-    for record, blocks, predicted, noise in zip(
-        linear.reduced.unit.records, linear.reduced.blocks, linear.predicted, linear.reduced.noise, strict=True
+    reduced, scale = linear.reduced, linear.reduced.torque_scale_nm
+    for record, blocks, trust, predicted, noise in zip(
+        reduced.unit.records, reduced.blocks, reduced.trust, linear.predicted, reduced.noise, strict=True
     ):
-        found = _leaps(record, blocks, predicted * linear.reduced.angle_scale_rad, noise)
+        found = _leaps(record, blocks, trust == 1.0, predicted * reduced.angle_scale_rad, noise)
         if found is not None:
             leap, size, time = found
             leaps.append(leap)
@@ -56,9 +59,10 @@ def find_jumps(linear: Linear) -> Jumps:
     leap, size = np.concatenate(leaps), np.concatenate(sizes)
     large = leap > LARGE
     count = int(large.sum())
+    factor = _mixture(leap) - max(_mixture(-leap), 0.0)
     if count < FEWEST or _repeated(places) > MOST_REPEATED:
-        return Jumps(0.0, count, 0.0)
-    return Jumps(float(max(_mixture(leap) - _mixture(-leap), 0.0)), count, float(np.median((leap * size)[large])))
+        return Jumps(min(factor, 0.0), count, 0.0)
+    return Jumps(factor, count, float(np.median((leap * size)[large])))
 
 
 def _places(blocks, times, scale):
@@ -85,7 +89,7 @@ def _near(values, others):
     return np.minimum(np.abs(values - left), np.abs(values - right)) < SAME
 
 
-def _leaps(record, blocks, predicted_rad, noise):
+def _leaps(record, blocks, trusted, predicted_rad, noise):
     """Differences of means in noise standard deviations, signed by the direction of motion, and that deviation [rad]."""
     step = float(np.median(np.diff(record.time_s)))
     half = max(2, int(round(0.5 * noise.correlation_time_s / step)))
@@ -101,7 +105,7 @@ def _leaps(record, blocks, predicted_rad, noise):
     wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
     direction = blocks.direction[blocks.leg[block]]
     turning = np.abs(np.diff(np.r_[direction, direction[-1:]])) > 0
-    calm = (wide < STEEP * np.median(slope))[block] & ~np.convolve(turning, np.ones(4 * half), "same").astype(bool)
+    calm = (trusted & (wide < STEEP * np.median(slope)))[block] & ~np.convolve(turning, np.ones(4 * half), "same").astype(bool)
     value, instant = (difference * direction)[calm], time[calm]
     if value.size < 20:
         return None
@@ -115,11 +119,13 @@ def _leaps(record, blocks, predicted_rad, noise):
 
 
 def _mixture(leap) -> float:
-    """Best log likelihood ratio of jumps among Gaussian noise, on the positive side."""
-    best = 0.0
+    """Log likelihood ratio of jumps among Gaussian noise, on the positive side, averaged over their size and share."""
+    found = []
     for size in SIZES:
         variance = 1.0 + size**2
-        ratio = np.where(leap > 0, -0.5 * np.log(variance) + 0.5 * leap**2 * (1 - 1 / variance) + np.log(2.0), -np.inf)
+        either = -0.5 * np.log(variance) + 0.5 * leap**2 * (1 - 1 / variance)
+        ahead = np.where(leap > 0, either + np.log(2.0), -np.inf)
+        noise = np.logaddexp(np.log1p(-STRAY), np.log(STRAY) + either)
         for share in SHARES:
-            best = max(best, float(np.sum(np.logaddexp(np.log1p(-share), np.log(share) + ratio))))
-    return best
+            found.append(np.sum(np.logaddexp(np.log1p(-share), np.log(share) + ahead) - noise))
+    return float(logsumexp(found) - np.log(len(found)))

@@ -71,9 +71,18 @@ class Linear:
     predicted: tuple[np.ndarray, ...]
 
     @property
+    def log_marginal(self) -> float:
+        """Log marginal likelihood of the joint model, comparable between modes, jitters and designs of one unit."""
+        return self.solution.log_marginal + self.data.log_volume
+
+    @property
     def weights(self) -> dict[str, np.ndarray]:
         """Mean weights by group."""
         return self.design.split(self.solution.mean)
+
+    def whitened(self, design: Design) -> Whitened:
+        """The columns of another design and the angles, whitened as the unit's own."""
+        return whiten(design.records(), self.angles, self.covariances, self.data.noise_dof, self.reduced.trust)
 
     def residuals(self) -> list[np.ndarray]:
         """Whitened residual of each record's blocks."""
@@ -85,8 +94,9 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE, e
     """The joint model's mode: damped Gauss-Newton steps for the distortion, knots refined where the residual asks for it."""
     fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)) + extra
     search = _Search(reduced, effects, modules, fixed)
-    trials = [search.run(start, TRIAL_STEPS) for start in _apart(possible_starts(reduced), reduced.context)]
-    best = max(trials, key=lambda found: found.solution.log_marginal)
+    starts = _apart([*possible_starts(reduced), Distortion()], reduced.context)
+    trials = [search.run(start, TRIAL_STEPS) for start in starts]
+    best = max(trials, key=lambda found: found.log_marginal)
     return search.run(best.distortion, STEPS, refine=True)
 
 
@@ -97,7 +107,7 @@ def learn_jitter(linear: Linear) -> Jitter:
 
     def height(jitter):
         size = Jitter(jitter.torque * noise, jitter.length)
-        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof)
+        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof, reduced.trust)
         prior = -0.5 * (np.log(jitter.torque / USUAL_JITTER.torque) / JITTER_LOG_SD) ** 2
         return data.log_marginal(scale) + data.log_volume + prior
 
@@ -187,7 +197,7 @@ class _Search:
             level = float(np.log(effect.present(self.reduced.context)))
             priors[effect.name] = (level, 0.0 if effect is BENCH_HYSTERESIS else WIDE)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
-        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof)
+        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.trust)
         scales = design.scales(priors)
         if start is not None:
             return data, *find_scales(data, scales, start, 4)

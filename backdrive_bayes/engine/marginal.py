@@ -129,15 +129,21 @@ def find_scales(data: Whitened, scales: Scales, start=None, sweeps: int = SWEEPS
     return log_scale, solution
 
 
-def whiten(columns, angles, covariances, noise_dof: float) -> Whitened:
-    """Whiten records' columns (blocks, weights) and angles (blocks,) and take out each record's offset."""
-    parts, volume = [], 0.0
-    for block, angle, covariance in zip(columns, angles, covariances, strict=True):
+def whiten(columns, angles, covariances, noise_dof: float, trust=None) -> Whitened:
+    """Whiten records' columns (blocks, weights) and angles (blocks,) and take out each record's offset.
+
+    ``trust`` (blocks,) of each record is the power to which a block's likelihood, given the blocks before it, is raised.
+    """
+    parts, volume, samples = [], 0.0, -len(columns)
+    trust = [np.ones(angle.size) for angle in angles] if trust is None else trust
+    for block, angle, covariance, power in zip(columns, angles, covariances, trust, strict=True):
         lower = np.linalg.cholesky(covariance)
         both = solve_triangular(lower, np.column_stack([block, angle, np.ones(angle.size)]), lower=True, check_finite=False)
+        both *= np.sqrt(power)[:, None]
+        samples += float(power.sum())
         length = np.linalg.norm(both[:, -1])
         one = both[:, -1] / length
-        volume -= float(np.log(np.diag(lower)).sum() + np.log(length))
+        volume -= float(power @ np.log(np.diag(lower)) + np.log(length))
         parts.append(both[:, :-1] - np.outer(one, one @ both[:, :-1]))
     joined = np.concatenate(parts)
-    return Whitened(joined[:, :-1], joined[:, -1], joined.shape[0] - len(parts), noise_dof, volume)
+    return Whitened(joined[:, :-1], joined[:, -1], samples, noise_dof, volume)

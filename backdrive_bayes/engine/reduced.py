@@ -16,6 +16,8 @@ from backdrive_bayes.records.reduction import Blocks, reduce_record
 
 MOST_BLOCKS = 1200
 """Blocks of all records together beyond which each record gets fewer."""
+UNSETTLED = 0.01
+"""Power of the likelihood before a record's first reversal, where the unknown initial state decides what is crossed when."""
 WHITE_SHARE = 0.2
 """Share of the white noise's standard deviation that is left in a block mean, for the scale of traces."""
 
@@ -54,6 +56,16 @@ class Reduced:
     def angles(self) -> tuple[np.ndarray, ...]:
         """Block means of the angle, (blocks,) for each record."""
         return tuple(b.angle_rad / self.angle_scale_rad for b in self.blocks)
+
+    @cached_property
+    def trust(self) -> tuple[np.ndarray, ...]:
+        """Power of the likelihood at each block, (blocks,) for each record: little until the torque has turned once, unless the
+        record begins near its largest torque or never turns."""
+        found = []
+        for blocks in self.blocks:
+            rest = blocks.direction.size > 1 and abs(blocks.turning_nm[0]) < 0.9 * np.abs(blocks.turning_nm).max()
+            found.append(np.where((blocks.leg == 0) & rest, UNSETTLED, 1.0))
+        return tuple(found)
 
     @cached_property
     def context(self) -> Context:

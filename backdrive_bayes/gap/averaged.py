@@ -10,7 +10,6 @@ from threadpoolctl import threadpool_limits
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.infer import infer, prepare
 from backdrive_bayes.engine.linearise import Linear
-from backdrive_bayes.engine.marginal import whiten
 from backdrive_bayes.engine.periodic import wave_group
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities
@@ -57,7 +56,7 @@ def with_columns(weighed: Weighed, effects: tuple[str, ...]) -> Linear:
     if not groups:
         return linear
     design = linear.design.joined(*groups)
-    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    data = linear.whitened(design)
     return replace(linear, design=design, data=data, log_scale=linear.log_scale | scales)
 
 

@@ -69,7 +69,7 @@ def _diagnose(unit, baseline, seed, allowed, k, progress):
     withheld = _withheld(linear, baseline)
     progress("weighing effects")
     weighed = weigh(linear, allowed)
-    properties = tuple(p for p in find_properties(weighed.linear, rng) if allowed is None or p.name in allowed)
+    properties = tuple(p for p in find_properties(weighed, rng) if allowed is None or p.name in allowed)
     joint = probabilities.probabilities(weighed.log_factor, weighed.left, {p.name: p.probability for p in properties})
     joint = _with_modules(joint, withheld)
     progress("where it lies and how far it shrinks")

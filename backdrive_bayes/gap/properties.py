@@ -1,33 +1,40 @@
-"""Effects inside the class: properties of the operator, each with a practical threshold.
+"""Effects inside the class: properties of the operator, each with a practical size.
 
 Evidence against the class cannot find what the class holds. A second clearance is a separate step of the settled loading branch;
 slip of the output interface is angle gained near full load that a branch without slip does not gain. The probability of each is
-that of the drawn operators beyond the threshold.
+that of its size among those that are there, not among those that every reducer has.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import expit, log_ndtr
 
+from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.marginal import find_scales
+from backdrive_bayes.gap.averaged import with_columns
+from backdrive_bayes.gap.hypotheses import Weighed
+from backdrive_bayes.gap.probabilities import CALIBRATION, log_prior
 from backdrive_bayes.mechanics.history import through
 
 DRAWS = 120
-APART = 2.5
+FALLEN = 0.1
+"""The first clearance is crossed where the slope has fallen to this share of its largest."""
+APART = 2.0
 """A second clearance is crossed at so many times the torque of the first at least."""
 LOWEST, HIGHEST = 0.1, 0.7
 """Torques, in shares of the largest, between which a second clearance is looked for."""
-STEP = 0.012
-"""Least angle of a second clearance, in shares of the angle scale."""
+STEP = 0.006
+"""Standard deviation of steps that every reducer has (teeth that engage one after the other), in shares of the angle scale."""
+LARGE_STEP = 0.04
+"""That of a second clearance or of slip where there is one."""
 ABOVE = 0.12
 """A step stands out where the slope exceeds the neighbourhood's by this share."""
 MIDDLE, TIP = (0.35, 0.65), 0.7
 """Torques from which the compliance is extrapolated, and from which on slip is looked for."""
-SLIP = 0.012
-"""Least angle of slip, in shares of the angle scale."""
 SURE = 0.97
 """No property is more certain than this: thresholds are practical, not physical."""
 
@@ -68,8 +75,9 @@ def second_clearance(branch: LoadingBranch) -> tuple[np.ndarray, float]:
     """Angle of the largest separate step beyond the first clearance (draws,), and its torque (0 where there is none)."""
     z, base = branch.z, _neighbourhood(branch)
     mean, level = branch.slope.mean(axis=0), base.mean(axis=0)
-    first = z[np.argmax(np.where(z < 0.35, mean, -np.inf))]
-    stands = (mean - level > ABOVE * np.maximum(level, 0.05)) & (z > max(APART * first, LOWEST)) & (z < HIGHEST)
+    peak = int(np.argmax(np.where(z < 0.35, mean, -np.inf)))
+    crossed = z[peak + int(np.argmax(mean[peak:] < FALLEN * mean[peak]))]
+    stands = (mean - level > ABOVE * np.maximum(level, 0.05)) & (z > max(APART * z[peak], crossed, LOWEST)) & (z < HIGHEST)
     edges = np.flatnonzero(np.diff(np.r_[False, stands, False]))
     best, place = np.zeros(branch.slope.shape[0]), 0.0
     for a, b in edges.reshape(-1, 2):
@@ -87,21 +95,37 @@ def slip_angle(branch: LoadingBranch) -> np.ndarray:
     return (branch.slope[:, top] - usual[:, None]) @ branch.dz[top]
 
 
-def find_properties(linear: Linear, rng) -> tuple[Property, ...]:
-    """Second clearance and interface slip."""
+def find_properties(weighed: Weighed, rng) -> tuple[Property, ...]:
+    """Second clearance and interface slip of the operator that is left where the likeliest effects act."""
+    linear = _beside_effects(weighed)
     branch, scale = loading_branch(linear, rng), linear.reduced.angle_scale_rad
     step, at = second_clearance(branch)
     slip = slip_angle(branch)
     return (
-        Property("second_backlash", beyond(step, STEP), step * scale, at * linear.reduced.torque_scale_nm),
-        Property("interface_slip", beyond(slip, SLIP), slip * scale, TIP * linear.reduced.torque_scale_nm),
+        Property("second_backlash", present(step), step * scale, at * linear.reduced.torque_scale_nm),
+        Property("interface_slip", present(slip), slip * scale, TIP * linear.reduced.torque_scale_nm),
     )
 
 
-def beyond(values, threshold: float) -> float:
-    """Probability that a size lies beyond a practical threshold, which is itself known to a third only."""
-    spread = np.hypot(np.std(values), threshold / 3.0)
-    return float(np.clip(ndtr((np.mean(values) - threshold) / spread), 1.0 - SURE, SURE))
+def present(values) -> float:
+    """Probability that a size known as ``values`` (draws,) is one of those that are there, not of those that all reducers have.
+
+    Sizes of the first kind are half-normal with LARGE_STEP, of the second normal with STEP about zero.
+    """
+    mean, variance = float(np.mean(values)), float(np.var(values)) + STEP**2
+    usual = -0.5 * np.log(variance) - 0.5 * mean**2 / variance
+    whole = variance + LARGE_STEP**2
+    large = np.log(2.0) - 0.5 * np.log(whole) - 0.5 * mean**2 / whole + log_ndtr(mean * LARGE_STEP / np.sqrt(variance * whole))
+    return float(np.clip(expit(large - usual + CALIBRATION.single), 1.0 - SURE, SURE))
+
+
+def _beside_effects(weighed: Weighed) -> Linear:
+    """The linear model solved with the effects that are likeliest, all others at trace level."""
+    best = max(weighed.log_factor, key=lambda h: weighed.log_factor[h] + log_prior(h, CALIBRATION))
+    linear = with_columns(weighed, best)
+    scales = linear.design.scales(levels(linear, best))
+    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
+    return replace(linear, solution=find_scales(linear.data, scales, start)[1])
 
 
 def _neighbourhood(branch):

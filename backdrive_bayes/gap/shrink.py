@@ -14,7 +14,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.linearise import Linear
-from backdrive_bayes.engine.marginal import Scales, find_scales, whiten
+from backdrive_bayes.engine.marginal import Scales, find_scales
 
 RESAMPLED = 400
 FEWEST_PIECES = 4
@@ -34,7 +34,7 @@ class Fitted:
 
 def fit_hypothesis(linear: Linear, effects, design: Design, priors) -> Fitted:
     """Scales and weights of a hypothesis on all records."""
-    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    data = linear.whitened(design)
     scales: Scales = design.scales(priors)
     start = np.array([linear.log_scale.get(n, priors[n][0]) for n in design.names])
     log_scale, solution = find_scales(data, scales, np.where(scales.free, start, scales.mean))
@@ -146,6 +146,7 @@ def _alone(design: Design, record: int) -> np.ndarray:
 def _ridge(linear, columns, angle, rows, record, scale, used) -> np.ndarray:
     """Posterior mean of the ``used`` weights given some rows, offsets by record integrated."""
     gram, moment = np.zeros((used.sum(), used.sum())), np.zeros(used.sum())
+    rows = rows[np.concatenate(linear.reduced.trust)[rows] == 1.0]
     start = np.searchsorted(record, np.arange(record.max() + 1))
     for r in np.unique(record[rows]):
         at = rows[record[rows] == r]

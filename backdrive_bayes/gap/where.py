@@ -9,7 +9,7 @@ import numpy as np
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linearise import Linear
-from backdrive_bayes.engine.marginal import find_scales, whiten
+from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.mechanics.registry import UNKNOWN
 from backdrive_bayes.records.branches import cycle_numbers, find_segments
 
@@ -42,7 +42,7 @@ def estimate_gap(linear: Linear, rng) -> Gap:
     group = path_group(linear.reduced, UNKNOWN)
     design = linear.design.joined(group)
     priors = levels(linear, ()) | {UNKNOWN.name: (float(np.log(UNKNOWN.present(linear.reduced.context))), 2.0)}
-    data = whiten(design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    data = linear.whitened(design)
     scales = design.scales(priors)
     start = np.array([linear.log_scale.get(n, priors[n][0]) for n in design.names])
     _, solution = find_scales(data, scales, np.where(scales.free, start, scales.mean))
@@ -54,7 +54,9 @@ def estimate_gap(linear: Linear, rng) -> Gap:
         columns = columns - columns.mean(axis=0)
         mean.append(columns @ solution.mean[own])
         error.append(columns @ (solution.root[own] @ noise))
-    weight = tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] for b in linear.reduced.blocks)
+    # Before the first reversal the initial state decides, and no effect can be told from it.
+    trusted = zip(linear.reduced.blocks, linear.reduced.trust, strict=True)
+    weight = tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * (trust == 1.0) for b, trust in trusted)
     variance = [np.diag(c) for c in linear.covariances]
     floor = sum(w @ v for w, v in zip(weight, variance, strict=True)) / sum(w.sum() for w in weight)
     return Gap(tuple(mean), tuple(error), weight, float(np.sqrt(floor)) * scale)
@@ -72,7 +74,8 @@ def gap_map(linear: Linear, gap: Gap) -> list[dict]:
         place = np.minimum((np.abs(blocks.torque_nm) / amplitude * BINS).astype(int), BINS - 1)
         for key in sorted({*zip(cycle.tolist(), branch.tolist(), place.tolist(), strict=True)}):
             own = (cycle == key[0]) & (branch == key[1]) & (place == key[2])
-            cells.append(_cell(blocks.name, key, own, gap, r, total, amplitude))
+            if gap.weight[r][own].any():
+                cells.append(_cell(blocks.name, key, own, gap, r, total, amplitude))
     return cells
 
 

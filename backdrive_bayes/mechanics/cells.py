@@ -17,7 +17,7 @@ import numpy as np
 from backdrive_bayes.mechanics.history import History
 
 START = ("neutral", "upper", "lower")
-"""Initial states: demagnetised, as after a large positive torque, as after a large negative one."""
+"""Initial states: demagnetised (a clearance in its middle), as after a large positive torque, as after a large negative one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,14 @@ class Cells:
         """Torque in the middle between them, (cells,)."""
         return 0.5 * (self.up + self.down + self.width)
 
+    @property
+    def clearance(self) -> np.ndarray:
+        """Which pairs cross at opposite torques, (cells,)."""
+        return np.isclose(self.up, -(self.down + self.width))
+
     def wider(self, factor: float) -> Cells:
         """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays."""
-        clearance = np.isclose(self.up, -(self.down + self.width))
+        clearance = self.clearance
         shift = (factor - 1.0) * self.threshold
         scale = np.where(clearance, factor, 1.0)
         up = np.where(clearance, factor * self.up, self.up + shift)
@@ -71,7 +76,9 @@ class Cells:
         high, low = np.clip(history.start - down, 0.0, width), np.clip(history.start - up, 0.0, width)
         first = {"upper": high, "lower": low}.get(state)
         if first is None:
-            first = np.clip(np.clip(history.start - 0.5 * (up + down), 0.0, width), low, high)
+            # A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing from its noise.
+            at_rest = np.where(np.r_[self.clearance, self.clearance], 0.5 * width, history.start - 0.5 * (up + down))
+            first = np.clip(np.clip(at_rest, 0.0, width), low, high)
         response = kernel(*arguments, up, down, width, first)
         centred = response - 0.5 * width
         return (centred[:, : self.count] + sign * centred[:, self.count :]) / self.norm

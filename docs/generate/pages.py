@@ -30,7 +30,7 @@ NUMBERS = {
     "ensembles": str(sample.ENSEMBLES),
     "least_closed": f"{100 * diagnose.LEAST_CLOSED:g} %",
     "step": f"{properties.STEP:g}",
-    "slip": f"{properties.SLIP:g}",
+    "large_step": f"{properties.LARGE_STEP:g}",
     "apart": f"{properties.APART:g}",
     "sure": f"{properties.SURE:g}",
 }

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.planted import SCALE, planted
+from support.planted import MORE, SCALE, planted
 
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.design import class_groups, class_priors
@@ -83,7 +83,8 @@ def test_an_offset_that_is_withheld_costs_likelihood(monkeypatch):
 
 @pytest.mark.parametrize("jitter", [(0.005, 0.05)])
 def test_a_planted_jitter_is_found_within_a_factor_of_three(jitter):
-    found = mode(jitter=jitter, drag=0.12, engagement=0.35)
+    # Each crossing tells of the jitter once: four records of two.
+    found = mode(jitter=jitter, drag=0.12, engagement=0.35, loops=MORE)
     assert jitter[0] / 3 < found.jitter.torque < 3 * jitter[0]
     assert jitter[1] / 6 < found.jitter.length < 6 * jitter[1]
     assert learn_jitter(found) == found.jitter, "what was learnt must hold at the mode"
@@ -113,6 +114,15 @@ def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
     added = np.setdiff1d(refined.reducer.knots, coarse.reducer.knots)
     assert np.median(np.abs(added - 0.05)) < 0.03
     assert refined.solution.log_marginal + refined.data.log_volume > coarse.solution.log_marginal + coarse.data.log_volume + 10
+
+
+def test_little_is_trusted_before_the_first_reversal(clean):
+    """A record from rest is trusted from its first turning point on; one that begins at its largest torque throughout."""
+    for blocks, trust in zip(clean.reduced.blocks, clean.reduced.trust, strict=True):
+        assert np.array_equal(trust < 1, blocks.leg == 0)
+    first = clean.reduced.blocks[0]
+    at_top = replace(first, turning_nm=np.r_[-first.turning_nm[1], first.turning_nm[1:]])
+    assert np.all(replace(clean.reduced, blocks=(at_top,)).trust[0] == 1.0)
 
 
 def test_compressing_a_unit_changes_no_log_marginal_likelihood(clean):

@@ -171,3 +171,14 @@ def test_a_fixed_scale_stays_where_it_is():
     mode, _ = find_scales(data, fixed)
     assert mode[0] == scales.mean[0] and mode[1] != scales.mean[1]
     assert fixed.log_prior(np.array([99.0, -1.0])) == 0.0
+
+
+def test_what_is_trusted_little_counts_as_so_many_fewer_samples(problem):
+    """A record trusted to a tenth weighs as one of ten times the covariance, with a tenth of its samples."""
+    columns, angles, covariances = problem
+    trust = [np.full(SIZES[0], 0.1), np.ones(SIZES[1])]
+    data = whiten(columns, angles, covariances, DOF, trust)
+    wide = whiten(columns, angles, [10.0 * covariances[0], covariances[1]], DOF)
+    for ours, theirs in ((data.gram, wide.gram), (data.moment, wide.moment), (data.total, wide.total)):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9)
+    assert data.samples == pytest.approx(0.1 * SIZES[0] + SIZES[1] - 2) and wide.samples == sum(SIZES) - 2

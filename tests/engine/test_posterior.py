@@ -76,8 +76,9 @@ def test_intervals_of_half_the_width_do_not():
 
 
 def test_intervals_are_narrow():
-    """Coverage is cheap with wide intervals; few blocks tell little of the lost motion alone."""
-    for name, most in (("lost_motion_rad", 0.5), ("loop_area_J", 0.05), ("dissipation_ratio", 0.1), ("peak_angle_rad", 0.1)):
+    """Coverage is cheap with wide intervals; few blocks tell little of the lost motion, and nothing
+    before the first reversal."""
+    for name, most in (("lost_motion_rad", 0.5), ("loop_area_J", 0.05), ("dissipation_ratio", 0.15), ("peak_angle_rad", 0.1)):
         widths = [np.diff(np.quantile(v, [0.05, 0.95]))[0] / abs(t) for v, t in (u[name] for u in drawn())]
         assert np.median(widths) < most, (name, np.median(widths))
 

@@ -18,7 +18,7 @@ SYMMETRY_BREAKERS = [n for n in NAMED if n not in ("none", "second_backlash", "i
 def found(name):
     """What was weighed in a unit, the properties of its operator and the joint probabilities."""
     weighed = weigh(prepared(name))
-    properties = {p.name: p for p in find_properties(weighed.linear, np.random.default_rng(0))}
+    properties = {p.name: p for p in find_properties(weighed, np.random.default_rng(0))}
     joint = gap.probabilities(weighed.log_factor, weighed.left, {n: p.probability for n, p in properties.items()})
     return weighed, properties, joint
 

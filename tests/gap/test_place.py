@@ -45,7 +45,8 @@ def test_a_step_in_one_record_lies_in_that_record():
 def test_what_is_even_lies_at_high_torque_of_either_sign_in_both_records():
     cells = where.gap_map(*gap_of("asymmetric_stiffness"))
     share = {b: sum(c["share"] for c in cells if c["branch"].endswith(b)) for b in "+-"}
-    assert 0.3 < share["+"] < 0.7
+    # One settled leg of each direction tells how it is shared: not in halves, but at either sign.
+    assert 0.2 < share["+"] < 0.8
     high = sum(c["share"] for c in cells if max(abs(c["torque_lo_Nm"]), abs(c["torque_hi_Nm"])) > 0.061)
     assert high > 0.55
     for blocks in gap_of("asymmetric_stiffness")[0].reduced.blocks:

@@ -49,7 +49,10 @@ def test_a_second_name_must_earn_its_place():
 
 def test_what_is_left_speaks_for_something_unlisted():
     log = given_factors(unknown=20.0)
-    assert unlisted(answer(log, {(): 50.0})) > unlisted(answer(log, {(): 1.0}))
+    listed = [h for h in log if "unknown" not in h]
+    assert unlisted(answer(log, dict.fromkeys(listed, 50.0))) > unlisted(answer(log, dict.fromkeys(listed, 1.0)))
+    one = dict.fromkeys(listed, 50.0) | {("lag",): 1.0}
+    assert answer(log, one)[("unknown",)] < answer(log, dict.fromkeys(listed, 50.0))[("unknown",)], "a lag explains it"
 
 
 def test_a_property_stands_beside_the_rest():

@@ -7,7 +7,7 @@ import pytest
 
 from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
 from backdrive_bayes.mechanics import registry
-from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, PathEffect, SpreadEffect, TangentEffect
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
 from backdrive_bayes.records.reduction import Blocks
@@ -17,6 +17,8 @@ PATHS = [n for n, t in TERMS.items() if isinstance(t, PathEffect)]
 TANGENTS = [n for n, t in TERMS.items() if isinstance(t, TangentEffect)]
 CONTEXT = Context(0.1, 0.02, np.array([0.2, 2.0]), np.array([25.0, 2.5]), 2e-3, 1e-3)
 TURNING = np.array([0.0, 1.0, -1.0, 1.0])
+LATE = {"lag_spread": Distortion(lag_s=0.02)}
+"""A lag smooths only where there is one."""
 REDUCER = ReducerClass(np.r_[0.0, np.geomspace(0.01, TOP, 20)])
 
 
@@ -51,7 +53,7 @@ def weights(seed=3):
 
 def column(name, reduced, distortion=None):
     """The columns that a design holds for one term, by record."""
-    distortion = distortion or Distortion()
+    distortion = distortion or LATE.get(name, Distortion())
     if isinstance(TERMS[name], PathEffect):
         return path_group(reduced, TERMS[name]).columns
     core = class_groups(reduced, REDUCER, distortion)
@@ -157,7 +159,7 @@ def test_tangents_are_derivatives_of_the_prediction():
 
 
 def test_every_term_is_of_one_known_kind():
-    assert all(isinstance(t, PathEffect | TangentEffect | FlankEffect) for t in TERMS.values())
+    assert all(isinstance(t, PathEffect | TangentEffect | FlankEffect | SpreadEffect) for t in TERMS.values())
     assert all(t.of_reducer is False for n, t in TERMS.items() if n in ("torque_offset", "sensor_lag", "thermal_drift"))
 
 

@@ -12,6 +12,7 @@ from backdrive_bayes.records.record import Record, Unit
 
 NOISE = BenchNoise()
 LOOPS = ((0.1, 0.02), (0.1, 0.1))
+MORE = ((0.1, 0.02), (0.1, 0.025), (0.1, 0.08), (0.1, 0.1))
 HERTZ = 400.0
 SCALE = 0.1
 PERIOD_RAD = 0.004
@@ -63,7 +64,7 @@ UNITS = {
     "sensor_lag": lambda: _smooth(lag_s=0.03),
     # A wave that is even in the angle: an odd one is part of an odd loop.
     "encoder_error": lambda: changed(_smooth(), lambda r, i: 4e-4 * np.cos(2 * np.pi * r.angle_rad / PERIOD_RAD)),
-    "thermal_drift": lambda: changed(_smooth(), lambda r, i: 1.5e-3 * (r.time_s / 20) ** 0.7),
+    "thermal_drift": lambda: changed(_smooth(loops=MORE), lambda r, i: 1.5e-3 * (r.time_s / 20) ** 0.7),
     "asymmetric_stiffness": lambda: changed(_smooth(), lambda r, i: 0.02 * np.abs(r.torque_nm)),
     # A step of the reading halfway through the first record.
     "unknown": lambda: changed(_smooth(), lambda r, i: 1.5e-3 * (r.time_s > 0.55 * r.time_s[-1]) * (i == 0)),

@@ -1,0 +1,35 @@
+"""What something unlisted may look like beside a process on each leg: a module that changes in time, a step in time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backdrive_bayes.engine.design import Group
+from backdrive_bayes.engine.linearise import Linear
+
+EVERY = 4
+"""Blocks between the instants at which a step is looked for: a step's column changes little over a few blocks."""
+
+
+def module_group(linear: Linear) -> Group:
+    """Each module's part of the prediction, constant and growing in time, with weights of each record."""
+    modules = sorted({p.module for p in linear.reducer.parts})
+    weights, columns = linear.weights, []
+    for r, blocks in enumerate(linear.reduced.blocks):
+        time = 2.0 * (blocks.mid_s - blocks.begin_s[0]) / (blocks.end_s[-1] - blocks.begin_s[0]) - 1.0
+        found = []
+        for module in modules:
+            names = [p.name for p in linear.reducer.parts if p.module == module]
+            part = sum(linear.design.groups[linear.design.names.index(n)].of_record(r) @ weights[n] for n in names)
+            found += [part, part * time]
+        columns.append(np.stack(found, axis=1))
+    return Group("module_change", tuple(columns), own=True)
+
+
+def step_group(linear: Linear) -> Group:
+    """The angle after each of many instants, with weights of each record."""
+    columns = []
+    for blocks in linear.reduced.blocks:
+        number = np.arange(blocks.count.size)
+        columns.append((number[:, None] >= number[EVERY:-EVERY:EVERY]).astype(float))
+    return Group("step", tuple(columns), own=True)
