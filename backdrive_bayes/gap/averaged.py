@@ -24,12 +24,28 @@ MOST = 2
 """Hypotheses that are averaged over at most."""
 
 
+_LAST: dict[tuple, Weighed] = {}
+"""The unit that was weighed last: a diagnosis after a fit of the same files goes on from it."""
+
+
+def weighed_unit(unit: Unit, modules=BASELINE, allowed=None, note=lambda text: None) -> Weighed:
+    """The effects of a unit weighed, by the same call for a fit and its diagnosis; what was read from the same files is kept."""
+    key = (unit.file_sha256, unit.data_sha256, modules, allowed)
+    if not unit.file_sha256 or key not in _LAST:
+        linear = prepare(unit, modules, note)
+        note("weighing effects")
+        found = weigh(linear, allowed)
+        _LAST.clear()
+        if not unit.file_sha256:
+            return found
+        _LAST[key] = found
+    return _LAST[key]
+
+
 def fit_posterior(unit: Unit, modules=BASELINE, seed: int = 0, note=lambda text: None) -> Posterior:
     """Posterior of a unit, averaged over what may break the symmetries of its class, the model discrepancy included."""
     with threadpool_limits(1, user_api="blas"):
-        linear = prepare(unit, modules, note)
-        note("weighing effects")
-        weighed = weigh(linear)
+        weighed = weighed_unit(unit, tuple(modules), None, note)
         joint = probabilities.probabilities(weighed.log_factor, weighed.left, {})
         likeliest = sorted(joint.items(), key=lambda item: -item[1])[:MOST]
         kept = [(h, p) for h, p in likeliest if p >= LEAST * likeliest[0][1]]
@@ -38,9 +54,12 @@ def fit_posterior(unit: Unit, modules=BASELINE, seed: int = 0, note=lambda text:
 
 
 def posterior_of(weighed: Weighed, effects: tuple[str, ...], seed: int, note=lambda text: None) -> Posterior:
-    """Posterior under one set of effects, in the linear model that weighed it."""
-    listed = tuple(e for e in effects if e in all_effects())
-    return replace(infer(with_columns(weighed, effects), listed, seed, note), hypothesis=tuple(effects))
+    """Posterior under one set of effects, in the linear model that weighed it; computed once for a seed."""
+    if (tuple(effects), seed) not in weighed.posteriors:
+        listed = tuple(e for e in effects if e in all_effects())
+        found = replace(infer(with_columns(weighed, effects), listed, seed, note), hypothesis=tuple(effects))
+        weighed.posteriors[tuple(effects), seed] = found
+    return weighed.posteriors[tuple(effects), seed]
 
 
 def with_columns(weighed: Weighed, effects: tuple[str, ...]) -> Linear:

@@ -9,14 +9,13 @@ import numpy as np
 from scipy.special import expit
 from threadpoolctl import threadpool_limits
 
-from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import next_test, probabilities, where
-from backdrive_bayes.gap.averaged import posterior_of, with_columns
-from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed, weigh
+from backdrive_bayes.gap.averaged import posterior_of, weighed_unit, with_columns
+from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed
 from backdrive_bayes.gap.parameters import effect_parameters, interval
 from backdrive_bayes.gap.properties import Property, find_properties
 from backdrive_bayes.gap.shrink import Fitted, fit_hypothesis, shrink
@@ -65,10 +64,8 @@ def diagnose(
 
 def _diagnose(unit, baseline, seed, allowed, k, progress):
     rng = np.random.default_rng(seed)
-    linear = prepare(unit, BASELINE, progress)
-    withheld = _withheld(linear, baseline)
-    progress("weighing effects")
-    weighed = weigh(linear, allowed)
+    weighed = weighed_unit(unit, BASELINE, allowed, progress)
+    withheld = _withheld(weighed.linear, baseline)
     properties = tuple(p for p in find_properties(weighed, rng) if allowed is None or p.name in allowed)
     joint = probabilities.probabilities(weighed.log_factor, weighed.left, {p.name: p.probability for p in properties})
     joint = _with_modules(joint, withheld)

@@ -41,7 +41,7 @@ class Weighed:
     jumps: Jumps
     left: dict[tuple[str, ...], float]
     contrasts: float
-    wave: Group | None = field(default=None)
+    posteriors: dict = field(default_factory=dict)
 
 
 def weigh(linear: Linear, allowed=None) -> Weighed:

@@ -19,6 +19,7 @@ from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.probabilities import CALIBRATION, log_prior
 from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.registry import UNKNOWN
 
 DRAWS = 120
 FALLEN = 0.1
@@ -98,25 +99,32 @@ def slip_angle(branch: LoadingBranch) -> np.ndarray:
 def find_properties(weighed: Weighed, rng) -> tuple[Property, ...]:
     """Second clearance and interface slip of the operator that is left where the likeliest effects act."""
     linear = _beside_effects(weighed)
-    branch, scale = loading_branch(linear, rng), linear.reduced.angle_scale_rad
+    branch, scale, uneven = loading_branch(linear, rng), linear.reduced.angle_scale_rad, _unevenness(linear)
     step, at = second_clearance(branch)
     slip = slip_angle(branch)
     return (
-        Property("second_backlash", present(step), step * scale, at * linear.reduced.torque_scale_nm),
-        Property("interface_slip", present(slip), slip * scale, TIP * linear.reduced.torque_scale_nm),
+        Property("second_backlash", present(step, uneven), step * scale, at * linear.reduced.torque_scale_nm),
+        Property("interface_slip", present(slip, uneven), slip * scale, TIP * linear.reduced.torque_scale_nm),
     )
 
 
-def present(values) -> float:
+def present(values, uneven: float = STEP) -> float:
     """Probability that a size known as ``values`` (draws,) is one of those that are there, not of those that all reducers have.
 
-    Sizes of the first kind are half-normal with LARGE_STEP, of the second normal with STEP about zero.
+    Sizes of the first kind are half-normal with LARGE_STEP, of the second normal with ``uneven`` about zero.
     """
-    mean, variance = float(np.mean(values)), float(np.var(values)) + STEP**2
+    mean, variance = float(np.mean(values)), float(np.var(values)) + uneven**2
     usual = -0.5 * np.log(variance) - 0.5 * mean**2 / variance
     whole = variance + LARGE_STEP**2
     large = np.log(2.0) - 0.5 * np.log(whole) - 0.5 * mean**2 / whole + log_ndtr(mean * LARGE_STEP / np.sqrt(variance * whole))
     return float(np.clip(expit(large - usual + CALIBRATION.single), 1.0 - SURE, SURE))
+
+
+def _unevenness(linear: Linear) -> float:
+    """Standard deviation of apparent steps: those of every reducer, and what a wave or leaps of the angle leave as such."""
+    waves = linear.design.predict(linear.weights, [n for n in ("wave", UNKNOWN.name) if n in linear.design.names] or ["none"])
+    height = max(float(np.std(w)) for w in waves)
+    return float(np.hypot(STEP, 2.0 * height))
 
 
 def _beside_effects(weighed: Weighed) -> Linear:

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.made_posterior import made_posterior
+from support.planted import UNITS
 
+from backdrive_bayes.gap import averaged
 from backdrive_bayes.gap.averaged import mixed
 
 
@@ -49,3 +51,19 @@ def test_the_worst_convergence_is_told():
     for drawn in ([(marked(1), 0.5), (bad, 0.5)], [(bad, 0.5), (marked(1), 0.5)]):
         assert not mixed(drawn).converged
     assert mixed([(marked(1), 0.5), (marked(2), 0.5)]).converged
+
+
+def test_a_diagnosis_goes_on_from_the_fit_of_the_same_files(monkeypatch):
+    """Weighed once for one set of files; anew where a file or the unit differs, or where no file is known."""
+    calls = []
+    monkeypatch.setattr(averaged, "prepare", lambda unit, *rest: calls.append(unit.name))
+    monkeypatch.setattr(averaged, "weigh", lambda linear, allowed: object())
+    monkeypatch.setattr(averaged, "_LAST", {})
+    made = UNITS["none"]()
+    read = replace(made, file_sha256="a")
+    assert averaged.weighed_unit(read) is averaged.weighed_unit(read) and len(calls) == 1
+    averaged.weighed_unit(replace(read, file_sha256="c"))
+    averaged.weighed_unit(replace(read, file_sha256="c", records=read.records[:1]))
+    averaged.weighed_unit(made)
+    averaged.weighed_unit(made)
+    assert len(calls) == 5
