@@ -1,5 +1,4 @@
 # make demo: set up and run the main job on the packaged data, ending in reports/demo/report.pdf
-# make demo-fleet: set up and evaluate the packaged fleet of twelve units, ending in reports/demo/fleet/report.pdf
 # make test: set up and run the tests
 # make lint: style (ruff) and types (mypy); no error is let through
 # make versions: the wheel with lowest and newest dependencies under Python 3.11 and 3.13 (a quarter of an hour)
@@ -10,14 +9,11 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS := 1
 export MPLBACKEND := Agg
 
-.PHONY: demo demo-fleet test docs lint versions clean
+.PHONY: demo test docs lint versions clean
 
 demo: $(VENV)/ready
 	$(BIN)/backdrive-bayes demo
 	cp reports/demo/reducer-1/figures/loop-2.png reports/demo/loop.png
-
-demo-fleet: $(VENV)/ready
-	$(BIN)/backdrive-bayes demo --fleet
 
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile

@@ -8,9 +8,9 @@ from pathlib import Path
 from backdrive_bayes.commands import accept, check, compare, diagnose, fit, fleet, report
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.results import BASELINE
-from backdrive_bayes.errors import BadInput
+from backdrive_bayes.errors import BadInput, MissingExtra
 
-HELP = "check, fit, diagnose, judge and compare the packaged twins and write one PDF, or with --fleet evaluate the packaged fleet"
+HELP = "check, fit, diagnose, judge and compare the packaged twins and write one PDF, then evaluate the packaged fleet"
 UNITS = ("reducer-1", "reducer-2")
 PACKAGED = (Path(__file__).parents[1] / "data").resolve()
 
@@ -18,13 +18,13 @@ PACKAGED = (Path(__file__).parents[1] / "data").resolve()
 def add_arguments(parser) -> None:
     """Options of this verb."""
     parser.add_argument("--data", type=Path, default=PACKAGED, help="folder of the units (default: those of the package)")
-    parser.add_argument("--fleet", action="store_true", help="fit the packaged fleet of twelve small units instead")
+    parser.add_argument("--fleet", action="store_true", help="fit the packaged fleet of twelve small units alone")
 
 
 def run(args) -> int:
-    """Check, fit, diagnose and judge every packaged unit, compare them, then the report; the worst code of the fits.
+    """Check, fit, diagnose and judge every packaged unit, compare them, then the report, and the packaged fleet with its own.
 
-    With ``args.fleet`` the packaged fleet and its report, and the fleet's code.
+    With ``args.fleet`` the fleet alone. Returns the worst code of the fits and the fleet.
     """
     out = args.out or Path("reports/demo/fleet" if args.fleet else "reports/demo")
     if not (args.data / UNITS[0]).is_dir():
@@ -45,6 +45,10 @@ def run(args) -> int:
     both = out / "comparison"
     compare.run(Namespace(units=list(results), out=both, claims="paper", rope=0.05, **defaults))
     report.run(Namespace(results=[*results, both], out=out, seed=args.seed))
+    try:
+        codes.append(_fleet(args.data / "fleet", out / "fleet", args.seed))
+    except MissingExtra as missing:
+        say(f"no fleet: {missing}")
     return max(codes)
 
 
