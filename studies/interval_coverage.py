@@ -4,7 +4,7 @@
     python studies/interval_coverage.py contact=/tmp/contact ode=/tmp/ode --workers 2
 
 Each clean unit of a folder made by studies/make_bench.py is fitted as the command `fit` does; the page
-reports/coverage/README.md says how
+reports/interval-coverage/README.md says how
 often the intervals of each indicator hold the reducer's own loop, how wide they are, and what binomial 99 % bounds allow.
 """
 
@@ -25,7 +25,7 @@ from scipy.stats import binom
 from backdrive_bayes.commands.results import FitOptions, fit_unit
 from backdrive_bayes.records.unit_folder import read_unit
 
-HOME = Path(__file__).parents[1] / "reports" / "coverage"
+HOME = Path(__file__).parents[1] / "reports" / "interval-coverage"
 TRUTH = {
     "lost_motion_rad": "lost_motion_rad",
     "zero_torque_width_rad": "backlash_rad",
