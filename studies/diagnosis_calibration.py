@@ -29,9 +29,9 @@ from backdrive_bayes.records.unit_folder import read_unit
 HOME = Path(__file__).parents[1] / "reports" / "diagnosis-calibration"
 FLOOR = 1e-3
 """Probability below which a log score counts no further."""
-UNSEEN = """Only the calibration numbers are set on the other benches: thresholds of properties, trace levels, the
-lowest frequency of a wave and the terms themselves were developed with units of all these benches in view, so that no bench
-here is wholly unseen."""
+UNSEEN = """Only the calibration numbers are set on the other benches, in a search that begins at, and is weakly held to, the
+package's numbers, which were set on all. Thresholds of properties, trace levels, the lowest frequency of a wave and the
+terms themselves were developed with units of all these benches in view: no bench here is wholly unseen."""
 FRESH = """Drawn with another seed (`studies/make_bench.py --units 40 --seed 2611`) and looked at once, by the code and with the
 package's numbers as they are; nothing was changed after it."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]

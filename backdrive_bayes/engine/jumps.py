@@ -59,7 +59,7 @@ def find_jumps(linear: Linear) -> Jumps:
     leap, size = np.concatenate(leaps), np.concatenate(sizes)
     large = leap > LARGE
     count = int(large.sum())
-    factor = _mixture(leap) - max(_mixture(-leap), 0.0)
+    factor = _mixture(leap) - _mixture(-leap)
     if count < FEWEST or _repeated(places) > MOST_REPEATED:
         return Jumps(min(factor, 0.0), count, 0.0)
     return Jumps(factor, count, float(np.median((leap * size)[large])))
@@ -120,12 +120,13 @@ def _leaps(record, blocks, trusted, predicted_rad, noise):
 
 def _mixture(leap) -> float:
     """Log likelihood ratio of jumps among Gaussian noise, on the positive side, averaged over their size and share."""
-    found = []
+    found, wide = [], 1.0 + SIZES[-1] ** 2
+    stray = np.log(STRAY) - 0.5 * np.log(wide) + 0.5 * leap**2 * (1 - 1 / wide)
     for size in SIZES:
         variance = 1.0 + size**2
         either = -0.5 * np.log(variance) + 0.5 * leap**2 * (1 - 1 / variance)
         ahead = np.where(leap > 0, either + np.log(2.0), -np.inf)
-        noise = np.logaddexp(np.log1p(-STRAY), np.log(STRAY) + either)
         for share in SHARES:
-            found.append(np.sum(np.logaddexp(np.log1p(-share), np.log(share) + ahead) - noise))
+            jumps = np.logaddexp(np.log(1.0 - share - STRAY), np.log(share) + ahead)
+            found.append(np.sum(np.logaddexp(jumps, stray) - np.logaddexp(np.log1p(-STRAY), stray)))
     return float(logsumexp(found) - np.log(len(found)))

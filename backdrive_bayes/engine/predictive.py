@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from backdrive_bayes.engine.covariance import whitener
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.mechanics.effect import PathEffect
@@ -23,14 +24,15 @@ def covariances_rad2(posterior: Posterior) -> list[np.ndarray]:
 
 def block_offsets(posterior: Posterior) -> list[float]:
     """The encoder's offset of each record [rad]: what is left between reading and prediction in the mean, by generalised
-    least squares.
+    least squares with as much trust in a block as its likelihood has.
     """
-    found = []
-    for blocks, predicted, covariance in zip(
-        posterior.records.blocks, posterior.predicted_rad, covariances_rad2(posterior), strict=True
+    found, trusts = [], Reduced(None, posterior.records.blocks, posterior.records.noise).trust
+    for blocks, predicted, covariance, trust in zip(
+        posterior.records.blocks, posterior.predicted_rad, covariances_rad2(posterior), trusts, strict=True
     ):
-        weight = np.linalg.solve(covariance, np.ones(blocks.count.size))
-        found.append(float(weight @ (blocks.angle_rad - predicted) / weight.sum()))
+        both = np.column_stack([np.ones(blocks.count.size), blocks.angle_rad - predicted])
+        one, left = (whitener(covariance) @ both * np.sqrt(trust)[:, None]).T
+        found.append(float(one @ left / (one @ one)))
     return found
 
 

@@ -119,7 +119,7 @@ class _Table:
         kinds = [self._of_terms(hypothesis, on | {k}) for k in KINDS[:2]]
         if ENCODER not in hypothesis:
             kinds.append(self._with_bank(on, "step", 1)[0])
-        return float(logsumexp(kinds) - np.log(len(KINDS)))
+        return float(logsumexp(kinds) - np.log(len(kinds)))
 
     def _on(self, hypothesis) -> set:
         return set().union(*(self.jumping if n == STICK_SLIP else self.terms.get(n, ()) for n in hypothesis))
@@ -127,7 +127,8 @@ class _Table:
     def _of_terms(self, hypothesis, on) -> float:
         if ENCODER in hypothesis:
             found, at = self._with_bank(on, "bank", 2)
-            self.frequency[hypothesis] = float(FREQUENCIES[at])
+            # Beside something unlisted, the first kind is the one whose columns a fit takes.
+            self.frequency.setdefault(hypothesis, float(FREQUENCIES[at]))
             return found
         if not on:
             return self.contrasts.log_marginal(self.scale(on))

@@ -17,7 +17,7 @@ from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
-from backdrive_bayes.gap.probabilities import CALIBRATION, log_prior
+from backdrive_bayes.gap.probabilities import CALIBRATION, probabilities
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.registry import UNKNOWN
 
@@ -77,7 +77,8 @@ def second_clearance(branch: LoadingBranch) -> tuple[np.ndarray, float]:
     z, base = branch.z, _neighbourhood(branch)
     mean, level = branch.slope.mean(axis=0), base.mean(axis=0)
     peak = int(np.argmax(np.where(z < 0.35, mean, -np.inf)))
-    crossed = z[peak + int(np.argmax(mean[peak:] < FALLEN * mean[peak]))]
+    fallen = np.flatnonzero(mean[peak:] < FALLEN * mean[peak])
+    crossed = z[peak + fallen[0]] if fallen.size else HIGHEST
     stands = (mean - level > ABOVE * np.maximum(level, 0.05)) & (z > max(APART * z[peak], crossed, LOWEST)) & (z < HIGHEST)
     edges = np.flatnonzero(np.diff(np.r_[False, stands, False]))
     best, place = np.zeros(branch.slope.shape[0]), 0.0
@@ -129,7 +130,8 @@ def _unevenness(linear: Linear) -> float:
 
 def _beside_effects(weighed: Weighed) -> Linear:
     """The linear model solved with the effects that are likeliest, all others at trace level."""
-    best = max(weighed.log_factor, key=lambda h: weighed.log_factor[h] + log_prior(h, CALIBRATION))
+    joint = probabilities(weighed.log_factor, weighed.left, {})
+    best = max((h for h in joint if h in weighed.log_factor), key=joint.get)
     linear = with_columns(weighed, best)
     scales = linear.design.scales(levels(linear, best))
     start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)

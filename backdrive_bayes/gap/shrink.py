@@ -113,8 +113,10 @@ def _folds(linear):
     blocks = linear.reduced.blocks
     if len(sizes) > 1:
         return {b.name: np.arange(a, z) for b, a, z in zip(blocks, ends[:-1], ends[1:], strict=True)}
-    legs = blocks[0].leg
-    return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in range(1, legs.max() + 1)} or {"all": np.arange(legs.size)}
+    legs, trusted = blocks[0].leg, linear.reduced.trust[0] == 1.0
+    settled = np.unique(legs[trusted])
+    # A fold needs others to be foretold from.
+    return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in settled} if settled.size > 1 else {"all": np.arange(legs.size)}
 
 
 def _held_out(linear: Linear, fitted: Fitted, own, record) -> np.ndarray:
@@ -172,9 +174,10 @@ def _control(linear, fitted, own, record) -> np.ndarray:
     residual = angle - columns @ fitted.mean
     torque = np.concatenate([b.torque_nm for b in linear.reduced.blocks]) / linear.reduced.torque_scale_nm
     direction = np.concatenate([b.direction[b.leg] for b in linear.reduced.blocks])
-    rest = np.setdiff1d(np.arange(record.size), own)
+    trusted = np.concatenate(linear.reduced.trust) == 1.0
+    rest = np.setdiff1d(np.flatnonzero(trusted), own)
     for r in np.unique(record):
-        residual[record == r] -= residual[record == r].mean()
+        residual[record == r] -= residual[(record == r) & trusted].mean()
     near = np.exp(-0.5 * ((torque[own, None] - torque[rest]) / 0.05) ** 2) * (direction[own, None] == direction[rest])
     return near @ residual[rest] / (near.sum(axis=1) + 1.0)
 

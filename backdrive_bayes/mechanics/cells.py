@@ -49,8 +49,8 @@ class Cells:
 
     @property
     def clearance(self) -> np.ndarray:
-        """Which pairs cross at opposite torques, (cells,)."""
-        return np.isclose(self.up, -(self.down + self.width))
+        """Which pairs cross up at positive torques and down at the opposite ones, (cells,)."""
+        return np.isclose(self.up, -(self.down + self.width)) & (self.up >= 0.0)
 
     def wider(self, factor: float) -> Cells:
         """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays."""

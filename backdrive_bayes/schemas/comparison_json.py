@@ -50,7 +50,7 @@ class AnsweredClaim(Struct):
     id: int | str
     claim: str
     probability: MaybeProbability
-    verdict: Literal["holds", "does not hold", "open", "not answered"]
+    verdict: Literal["holds", "does not hold", "open", "not answered", "inconclusive"]
     asked: str = ""
     reason: str = ""
     note: str = ""

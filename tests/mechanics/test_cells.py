@@ -191,3 +191,13 @@ def test_states_bound_the_neutral_one(name):
     assert np.all(lower <= neutral + 1e-15) and np.all(neutral <= upper + 1e-15)
     if name == "friction":
         assert np.any(lower < upper - 1e-3), "a free initial state must make a difference"
+
+
+@pytest.mark.parametrize("start", [-0.95, 0.0, 0.2, 0.95])
+def test_a_record_may_begin_with_its_friction_left_up_or_down(start):
+    """No column of the initial state vanishes, wherever the first torque lies, unless that torque itself forces it."""
+    reducer = ReducerClass(np.r_[0.0, np.geomspace(0.01, 1.2, 20)])
+    initial = reducer.initial_columns(along(path(np.array([start, start + 0.01]))))["initial"]
+    upper, lower = np.abs(initial).max(axis=0).reshape(2, -1)
+    assert np.all(np.maximum(upper, lower) > 1e-3)
+    assert np.all((upper > 1e-3) & (lower > 1e-3)) or abs(start) > 0.1
