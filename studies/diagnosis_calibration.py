@@ -32,8 +32,8 @@ FLOOR = 1e-3
 UNSEEN = """Only the calibration numbers are set on the other benches, in a search that begins at, and is weakly held to, the
 package's numbers, which were set on all. Thresholds of properties, trace levels, the lowest frequency of a wave and the
 terms themselves were developed with units of all these benches in view: no bench here is wholly unseen."""
-FRESH = """Drawn with another seed (`studies/make_bench.py --units 40 --seed 2611`) and scored with the package's numbers. They were
-weighed twice: errors that a reader of the code found were mended in between, and nothing was chosen on these units."""
+FRESH = """Drawn with another seed (`studies/make_bench.py --units 40 --seed 2611`) and scored with the package's numbers. They
+were weighed twice: errors that a reader of the code found were mended in between, and nothing was chosen on these units."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 
 
