@@ -33,7 +33,7 @@ UNSEEN = """Only the calibration numbers are set on the other benches, in a sear
 package's numbers, which were set on all. Thresholds of properties, trace levels, the lowest frequency of a wave and the
 terms themselves were developed with units of all these benches in view: no bench here is wholly unseen."""
 FRESH = """Drawn with another seed (`studies/make_bench.py --units 40 --seed 2611`) and scored with the package's numbers. They
-were weighed twice: errors that a reader of the code found were mended in between, and nothing was chosen on these units."""
+were weighed before errors that a reader of the code found were mended (commit b142ed3); nothing was chosen on these units."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 
 
