@@ -135,7 +135,7 @@ def _summarise(result: dict, tally, out: Path) -> None:
     if len(result["failures"]) > 10:
         say(f"  and {len(result['failures']) - 10} more in {NAME}")
     for name, where in result["same_names"].items():
-        say(f"  warning: {len(where)} units are named '{name}' ({', '.join(where[:5])}); rows are told apart by their folder")
+        say(f"  warning: {len(where)} units are named '{name}' ({', '.join(where[:5])}); rows are distinguished by their folder")
     for what in ("verdicts", "effects"):
         if result[what]:
             say(f"  {what}: " + ", ".join(f"{n} {name}" for name, n in result[what].items()))

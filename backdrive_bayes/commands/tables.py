@@ -134,7 +134,7 @@ def _ratio(found: dict | None) -> str:
 
 
 def _limit(row: dict) -> tuple[str, float]:
-    """A limit in words, and the factor into the unit in which it is told."""
+    """A limit in words, and the factor into the unit in which it is shown."""
     ends = [row[end] if row[end] is not None and math.isfinite(row[end]) else None for end in ("min", "max")]
     unit, factor = _in_prefix(row["unit"], max(abs(end) for end in [*ends, row["median"]] if end is not None))
     low, high = (None if end is None else f"{end * factor:.4g}" for end in ends)

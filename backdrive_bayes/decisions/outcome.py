@@ -17,7 +17,7 @@ UNFIT, INCONCLUSIVE = 2, 4
 
 @dataclass(frozen=True)
 class Outcome:
-    """One ``word``, a ``caveat`` that belongs to it wherever it is told, the ``reason``, and the exit code of the verb."""
+    """One ``word``, a ``caveat`` that is shown with it everywhere, the ``reason``, and the exit code of the verb."""
 
     word: str
     reason: str = ""

@@ -207,10 +207,15 @@ def posterior_parameters(posterior: Posterior) -> dict[str, np.ndarray]:
 
 def implied_prior(posterior: Posterior, draws: int = 500, seed: int = 0) -> dict[str, np.ndarray]:
     """The same for ``draws`` reducers from the prior of the class with this posterior's knots."""
-    rng = np.random.default_rng([seed, 7])
-    drawn = {}
+    return parameters_of(Operator.of(posterior, prior_weights(posterior, draws, np.random.default_rng([seed, 7]))[1]))
+
+
+def prior_weights(posterior: Posterior, draws: int, rng) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Log scales (draws,) and weights (draws, weights) of every part of the class from its prior, with a posterior's knots."""
+    log_scale, weights = {}, {}
     for part in posterior.reducer.parts:
         mean, sd = part.log_scale
-        scale = np.exp(mean + sd * rng.standard_normal((draws, 1)))
-        drawn[part.name] = scale * rng.standard_normal((draws, posterior.flat[part.name].shape[1]))
-    return parameters_of(Operator.of(posterior, drawn))
+        log_scale[part.name] = mean + sd * rng.standard_normal(draws)
+        size = posterior.flat[part.name].shape[1]
+        weights[part.name] = np.exp(log_scale[part.name])[:, None] * rng.standard_normal((draws, size))
+    return log_scale, weights

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.figures.catalogue import PNG_DPI, save_svg
+from backdrive_bayes.figures.catalogue import save_each
 from backdrive_bayes.figures.style import BLUE, GREY, SERIES, Figure, new_figure, styled, words
 from backdrive_bayes.results import BLIND, read_result
 
@@ -27,14 +27,7 @@ def blind_figures(result: dict) -> dict[str, Figure]:
 
 def save_blind(folder: Path, out: Path) -> list[Path]:
     """Write the figures of ``folder``/blind.json into ``out`` as .svg and .png."""
-    out.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in blind_figures(read_result(Path(folder) / "blind.json", BLIND)).items():
-        written.append(save_svg(figure, out / f"{name}.svg"))
-        with styled():
-            figure.savefig(out / f"{name}.png", format="png", dpi=PNG_DPI)
-        written.append(out / f"{name}.png")
-    return written
+    return save_each(blind_figures(read_result(Path(folder) / "blind.json", BLIND)), out)
 
 
 def _confusion(result):

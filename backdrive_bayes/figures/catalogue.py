@@ -104,20 +104,21 @@ def _split(name, draw, saved, records, at_most):
 
 def save_figures(folder: Path, out: Path) -> list[Path]:
     """Write every figure of ``folder`` into ``out`` as .svg and .png; equal results give equal bytes."""
-    return _save(all_figures(folder), out)
+    return save_each(all_figures(folder), out)
 
 
 def save_verdict_figures(folder: Path, out: Path) -> list[Path]:
     """The same for the verdict in ``folder``."""
-    return _save(verdict_figures(read_result(Path(folder) / "verdict.json", VERDICT)), out)
+    return save_each(verdict_figures(read_result(Path(folder) / "verdict.json", VERDICT)), out)
 
 
 def save_comparison_figures(folder: Path, out: Path) -> list[Path]:
     """The same for the comparison in ``folder``."""
-    return _save(comparison_figures(read_result(Path(folder) / "comparison.json", COMPARISON)), out)
+    return save_each(comparison_figures(read_result(Path(folder) / "comparison.json", COMPARISON)), out)
 
 
-def _save(figures, out):
+def save_each(figures: dict[str, Figure], out: Path) -> list[Path]:
+    """Write figures by name into ``out`` as .svg and .png."""
     out.mkdir(parents=True, exist_ok=True)
     written = []
     for name, figure in figures.items():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.ticker import MaxNLocator
 
-from backdrive_bayes.figures.catalogue import PNG_DPI, save_svg
+from backdrive_bayes.figures.catalogue import save_each
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -34,7 +34,7 @@ CAPTIONS = {
 }
 MOST_BATCHES = 4
 MOST_INTERVALS = 150
-"""Units up to which intervals and points are told apart."""
+"""Units up to which intervals and points are drawn one by one."""
 _ORDERS = {"unit": "path", "test_date": "test date", "serial": "serial number"}
 _UNITS = {"lost_motion_rad": "rad", "loop_area_J": "J", "dissipation_ratio": "1"}
 
@@ -60,14 +60,7 @@ def fleet_figures(result: dict) -> dict[str, Figure]:
 
 def save_fleet(folder: Path, out: Path) -> list[Path]:
     """Write the figures of ``folder``/fleet.json into ``out`` as .svg and .png."""
-    out.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in fleet_figures(read_result(Path(folder) / "fleet.json", FLEET)).items():
-        written.append(save_svg(figure, out / f"{name}.svg"))
-        with styled():
-            figure.savefig(out / f"{name}.png", format="png", dpi=PNG_DPI)
-        written.append(out / f"{name}.png")
-    return written
+    return save_each(fleet_figures(read_result(Path(folder) / "fleet.json", FLEET)), out)
 
 
 def _charts(result):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.figures.catalogue import PNG_DPI, save_svg
+from backdrive_bayes.figures.catalogue import save_each
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -48,13 +48,7 @@ def pool_figures(result: dict) -> dict[str, Figure]:
 
 def save_pool(folder: Path, out: Path) -> list[Path]:
     """Write the figures of ``folder``/pool.json into ``out`` as .svg and .png."""
-    out.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in pool_figures(read_result(Path(folder) / "pool.json", POOL)).items():
-        written += [save_svg(figure, out / f"{name}.svg"), out / f"{name}.png"]
-        with styled():
-            figure.savefig(written[-1], format="png", dpi=PNG_DPI)
-    return written
+    return save_each(pool_figures(read_result(Path(folder) / "pool.json", POOL)), out)
 
 
 def shown_quantities(result: dict) -> list[dict]:

@@ -115,7 +115,7 @@ def _folds(linear):
         return {b.name: np.arange(a, z) for b, a, z in zip(blocks, ends[:-1], ends[1:], strict=True)}
     legs, trusted = blocks[0].leg, linear.reduced.trust[0] == 1.0
     settled = np.unique(legs[trusted])
-    # A fold needs others to be foretold from.
+    # A fold needs others to be predicted from.
     return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in settled} if settled.size > 1 else {"all": np.arange(legs.size)}
 
 

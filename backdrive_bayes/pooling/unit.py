@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backdrive_bayes.decisions.evidence import Evidence
-from backdrive_bayes.engine.parameters import PARAMETERS
+from backdrive_bayes.engine.parameters import PARAMETERS, prior_weights
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators.draws import CORE, UNITS, IndicatorDraws
 
@@ -72,11 +72,6 @@ def _of_parameters(evidence, prior) -> Iterator[Told]:
 
 def prior_of(posterior: Posterior, draws: int, seed: int = 0) -> Posterior:
     """One chain of ``draws`` reducers from the prior of the class with a posterior's knots, without effects."""
-    rng = np.random.default_rng([seed, 17])
-    weights, log_scale = {}, {}
-    for part in posterior.reducer.parts:
-        mean, sd = part.log_scale
-        log_scale[part.name] = mean + sd * rng.standard_normal((1, draws))
-        size = posterior.flat[part.name].shape[1]
-        weights[part.name] = np.exp(log_scale[part.name])[..., None] * rng.standard_normal((1, draws, size))
+    drawn = prior_weights(posterior, draws, np.random.default_rng([seed, 17]))
+    log_scale, weights = ({name: values[None] for name, values in of_parts.items()} for of_parts in drawn)
     return replace(posterior, weights=weights, log_scale=log_scale, log_density=np.zeros((1, draws)), effects=())

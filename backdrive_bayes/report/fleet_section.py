@@ -137,4 +137,4 @@ def _failures(result):
             yield Note(f"And {len(failures) - MOST_FAILURES} more in fleet.json.")
     for name, where in result["same_names"].items():
         many = f"{len(where)} units are named {free(name, 40)}"
-        yield Paragraph(free(f"{many}: {free(', '.join(where), 160)}. Rows of the table are told apart by folder.", 300))
+        yield Paragraph(free(f"{many}: {free(', '.join(where), 160)}. The table lists them by folder.", 300))

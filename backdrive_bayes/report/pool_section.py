@@ -15,7 +15,7 @@ _METHOD = (
     "Partial pooling. The units' true values are taken as normal, for positive quantities in their logarithm, about a batch mean "
     "with a batch spread, both unknown with flat densities (Gelman 2006, doi:10.1214/06-BA117A). Each unit enters by its stored "
     "draws: its own prior is divided out and what remains is compressed to a mixture of normal distributions, so that no unit is "
-    "fitted again. The loss is the Kullback-Leibler divergence of what is told from what the draws themselves say, re-weighted."
+    "fitted again. The loss is the Kullback-Leibler divergence of the stated posterior from that of the re-weighted draws."
 )
 
 
