@@ -12,11 +12,10 @@ import numpy as np
 
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.engine.sample import sample_density
-from backdrive_bayes.pooling.mixture import Mixture, log_sum
+from backdrive_bayes.pooling.mixture import LOG_ROOT, Mixture, log_sum
 
 FEWEST_UNITS = 5
 """Below it a flat density of the spread leaves nearly any spread possible."""
-_LOG_ROOT = 0.5 * np.log(2 * np.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +84,7 @@ def _log_evidence(mean, spread, weight, unit_mean, unit_sd):
     """Draws by units' components to draws (by units)."""
     total = unit_sd**2 + np.asarray(spread)[..., None] ** 2
     with np.errstate(divide="ignore"):
-        parts = np.log(weight) - 0.5 * np.log(total) - _LOG_ROOT - 0.5 * (np.asarray(mean)[..., None] - unit_mean) ** 2 / total
+        parts = np.log(weight) - 0.5 * np.log(total) - LOG_ROOT - 0.5 * (np.asarray(mean)[..., None] - unit_mean) ** 2 / total
     return log_sum(parts)
 
 

@@ -12,13 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from backdrive_bayes.pooling.hierarchy import Hierarchy
-from backdrive_bayes.pooling.mixture import Mixture, log_sum
+from backdrive_bayes.pooling.mixture import LOG_ROOT, Mixture, log_sum
 
 MOST_BITS = 0.2
 """Loss up to which results stand: that of a normal distribution shifted by half of its standard deviation."""
 BINS = 20
 """So that either tail beyond a 90 % interval is a bin of its own."""
-_LOG_ROOT = 0.5 * np.log(2 * np.pi)
 
 
 def batch_loss(hierarchy: Hierarchy, units: list[Mixture], draws: list, weights: list) -> float:
@@ -59,4 +58,4 @@ def _against_uniform(at, share) -> float:
 def _log_normal(x, hierarchy):
     """Log density of draws (draws,) under each draw of the hierarchy, (hierarchy, draws)."""
     spread = hierarchy.spread[:, None]
-    return -0.5 * ((np.asarray(x) - hierarchy.mean[:, None]) / spread) ** 2 - np.log(spread) - _LOG_ROOT
+    return -0.5 * ((np.asarray(x) - hierarchy.mean[:, None]) / spread) ** 2 - np.log(spread) - LOG_ROOT

@@ -14,7 +14,8 @@ GAIN = 1e-5
 """Gain of the mean log density below which a fit is at its end; over a thousand draws far less than decides between fits."""
 NARROWEST = 0.02
 """Least standard deviation of a component in that of the draws, so that none collapses onto a draw."""
-_LOG_ROOT = 0.5 * np.log(2 * np.pi)
+LOG_ROOT = 0.5 * np.log(2 * np.pi)
+"""What a normal density has in its logarithm besides its standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,4 +106,4 @@ def log_sum(x, axis: int = -1) -> np.ndarray:
 def _log_parts(x, mixture):
     """Log of share times density of every component, (points, components)."""
     z = (np.asarray(x)[:, None] - mixture.mean) / mixture.sd
-    return np.log(mixture.weight) - np.log(mixture.sd) - _LOG_ROOT - 0.5 * z**2
+    return np.log(mixture.weight) - np.log(mixture.sd) - LOG_ROOT - 0.5 * z**2
