@@ -23,7 +23,7 @@ _EFFECTS = (
     "An effect of the reducer or of the measuring channel breaks a symmetry of the class (rate, oddness, time, memory, period in "
     "the angle). A fit holds each at the level of traces. A diagnosis weighs them by the marginal likelihood of contrasts in "
     "which a clean reducer of the class cancels. A second clearance and slip of the output interface break none: they are "
-    "properties of the operator, and their probability is that of the drawn operators beyond a practical threshold."
+    "properties of the operator, and their probability is that of the drawn operators of a practical size."
 )
 _DEFINITIONS = [
     ("T, T_r", "amplitude of a loop; rated torque"),
