@@ -36,7 +36,7 @@ class KnownReducer:
     def angle_rad(self, time_s, torque_nm) -> np.ndarray:
         """Angle [rad] along a torque history of shape (samples,), from the neutral state at its first sample."""
         history = through(np.r_[time_s[:1], time_s], np.r_[torque_nm[:1], torque_nm], self.torque_scale_nm)
-        total = sum(part.cells.ends(history) @ self.weights[part.name] for part in self.reducer.parts)
+        total = sum((part.cells.ends(history) @ self.weights[part.name] for part in self.reducer.parts), np.zeros(()))
         return total * self.angle_scale_rad
 
 

@@ -117,7 +117,7 @@ def learn_jitter(linear: Linear) -> Jitter:
     while True:
         for other in _neighbours(best):
             known.setdefault(other, height(other) if other not in known else 0.0)
-        better = max(known, key=known.get)
+        better = max(known, key=lambda size: known[size])
         if better == best:
             return Jitter(best.torque * noise, best.length)
         best = better
@@ -264,7 +264,7 @@ def _refined(linear) -> np.ndarray | None:
     reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
     for blocks, white in zip(reduced.blocks, linear.residuals(), strict=True):
         low, high = np.abs(blocks.edges_nm()) / reduced.torque_scale_nm
-        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & (blocks.leg > 0)):
+        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & (blocks.leg > 0)).tolist():
             for j in range(max(i - 1, 0), min(i + 2, white.size)):
                 wanted.append(np.linspace(low[j], high[j], 5))
     if not wanted:

@@ -6,7 +6,7 @@ degrees of freedom, a flat offset for each record. X and y are whitened by C and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -37,7 +37,8 @@ class Solution:
 class Whitened:
     """Whitened columns ``x`` (samples, weights) and data ``y`` (samples,) with the number of independent samples.
 
-    ``log_volume`` is what the whitening itself adds to the log marginal likelihood.
+    ``log_volume`` is what the whitening itself adds to the log marginal likelihood. ``gram`` (weights, weights), ``moment``
+    (weights,) and ``total`` are the inner products of columns and data that every solution needs.
     """
 
     x: np.ndarray
@@ -45,6 +46,9 @@ class Whitened:
     samples: float
     noise_dof: float
     log_volume: float = 0.0
+    gram: np.ndarray = field(init=False)
+    moment: np.ndarray = field(init=False)
+    total: float = field(init=False)
 
     def __post_init__(self):
         object.__setattr__(self, "gram", self.x.T @ self.x)
@@ -134,7 +138,7 @@ def whiten(columns, angles, covariances, noise_dof: float, trust=None) -> Whiten
 
     ``trust`` (blocks,) of each record is the power to which a block's likelihood, given the blocks before it, is raised.
     """
-    parts, volume, samples = [], 0.0, -len(columns)
+    parts, volume, samples = [], 0.0, -float(len(columns))
     trust = [np.ones(angle.size) for angle in angles] if trust is None else trust
     for block, angle, covariance, power in zip(columns, angles, covariances, trust, strict=True):
         lower = np.linalg.cholesky(covariance)

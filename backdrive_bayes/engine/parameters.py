@@ -51,11 +51,10 @@ class Operator:
     def loading_slope(self, parts: tuple[str, ...], low: float, high: float) -> np.ndarray:
         """Secant of the settled loading branch of some parts between two shares of the largest torque [rad/(N·m)], (draws,)."""
         history = through(np.arange(5.0), np.array([0.0, 1.0, -1.0, low, high]), 1.0)
-        found = 0.0
-        for part in (self.reducer.part(name) for name in parts):
-            if part is not None:
-                ends = part.cells.ends(history)
-                found = found + self.weights[part.name] @ (ends[-1] - ends[-2])
+        found = np.zeros(1)
+        for part in (p for p in self.reducer.parts if p.name in parts):
+            ends = part.cells.ends(history)
+            found = found + self.weights[part.name] @ (ends[-1] - ends[-2])
         return found / (high - low) * self.angle_scale_rad / self.torque_scale_nm
 
 

@@ -58,7 +58,7 @@ class Posterior:
     convergence: Convergence
     acceptance: float
     seed: int
-    hypothesis: tuple[str, ...] = ()
+    hypothesis: tuple[str, ...] | None = ()
     jitter: tuple[float, float] = (0.0, 0.0)
     doubts: tuple[str, ...] = ()
 
@@ -93,7 +93,7 @@ class Posterior:
         ``modules`` restricts the class to some of its modules and leaves out effects.
         """
         log_rate = self._log_rate(rate_nm_per_s)
-        found = 0.0
+        found = np.zeros(())
         base = self.reducer.ends(history, self.distortion.exponents, log_rate)
         for name, columns in base.items():
             if modules is None or self.reducer.part(name).module in modules:

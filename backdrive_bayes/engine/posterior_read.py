@@ -53,7 +53,9 @@ def _rebuilt(groups) -> Posterior:
         **{name: tuple(constant[name].values[own == r] for r in range(records.count)) for name in ARRAYS},
         convergence=Convergence(
             tuple(json.loads(about["convergence_names"])),
-            *(constant[name].values for name in ("rhat", "bulk_ess", "tail_ess")),
+            constant["rhat"].values,
+            constant["bulk_ess"].values,
+            constant["tail_ess"].values,
             int(about["evaluations"]),
         ),
         acceptance=float(about["acceptance"]),

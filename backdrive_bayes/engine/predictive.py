@@ -6,7 +6,7 @@ import numpy as np
 
 from backdrive_bayes.engine.covariance import whitener
 from backdrive_bayes.engine.posterior import Posterior
-from backdrive_bayes.engine.reduced import Jitter, Reduced
+from backdrive_bayes.engine.reduced import BlockMeans, Jitter
 from backdrive_bayes.mechanics.effect import PathEffect
 from backdrive_bayes.mechanics.history import of_blocks
 
@@ -16,7 +16,7 @@ REPLICATES_A_CHAIN = 50
 def covariances_rad2(posterior: Posterior) -> list[np.ndarray]:
     """Covariance of each record's block means about the mode [rad²], (blocks, blocks) each."""
     scale, angle = posterior.context.torque_scale_nm, posterior.context.angle_scale_rad
-    reduced = Reduced(None, posterior.records.blocks, posterior.records.noise)
+    reduced = BlockMeans(posterior.records.blocks, posterior.records.noise)
     jitter = Jitter(posterior.jitter[0] / scale, max(posterior.jitter[1] / scale, 1e-12))
     slopes = reduced.slopes([p / angle for p in posterior.predicted_rad])
     return [c * reduced.angle_scale_rad**2 for c in reduced.covariances(slopes, jitter)]
@@ -26,7 +26,7 @@ def block_offsets(posterior: Posterior) -> list[float]:
     """The encoder's offset of each record [rad]: what is left between reading and prediction in the mean, by generalised
     least squares with as much trust in a block as its likelihood has.
     """
-    found, trusts = [], Reduced(None, posterior.records.blocks, posterior.records.noise).trust
+    found, trusts = [], BlockMeans(posterior.records.blocks, posterior.records.noise).trust
     for blocks, predicted, covariance, trust in zip(
         posterior.records.blocks, posterior.predicted_rad, covariances_rad2(posterior), trusts, strict=True
     ):
@@ -60,7 +60,7 @@ def _departures(posterior: Posterior, record: int) -> np.ndarray:
         if isinstance(effect, PathEffect) and effect.name in posterior.flat:
             columns[effect.name] = history.mean(*effect.responses(history, record, context))
     per_record = {"initial", "floating", *(e.name for e in posterior.effects if e.per_record)}
-    found = 0.0
+    found = np.zeros(())
     for name, column in columns.items():
         weights = posterior.flat.get(name, np.zeros((1, 0)))
         if name in per_record and weights.shape[1] == column.shape[1] * own.count:

@@ -35,10 +35,9 @@ class Jitter:
 
 
 @dataclass(frozen=True, eq=False)
-class Reduced:
-    """A unit reduced to block means; angles in shares of ``angle_scale_rad``, torques of ``torque_scale_nm`` (the largest)."""
+class BlockMeans:
+    """Block means of records; angles in shares of ``angle_scale_rad``, torques of ``torque_scale_nm`` (the largest)."""
 
-    unit: Unit
     blocks: tuple[Blocks, ...]
     noise: tuple[NoiseEstimate, ...]
 
@@ -104,6 +103,13 @@ class Reduced:
             found.append(matrix / self.angle_scale_rad**2)
         return found
 
+
+@dataclass(frozen=True, eq=False)
+class Reduced(BlockMeans):
+    """A unit reduced to block means, with the ``unit`` itself."""
+
+    unit: Unit
+
     def without(self, record: int) -> Reduced:
         """The unit less one record."""
         return replace(
@@ -120,4 +126,4 @@ def reduce_unit(unit: Unit, blocks_per_leg: int | None = None) -> Reduced:
     # A loop from rest has two and a half legs.
     count = blocks_per_leg or int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 60, 120))
     blocks = tuple(reduce_record(r, s, n, count) for r, s, n in zip(unit.records, segments, noise, strict=True))
-    return Reduced(unit, blocks, noise)
+    return Reduced(blocks, noise, unit)

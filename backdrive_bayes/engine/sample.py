@@ -166,7 +166,10 @@ ABOVE = 1.5
 
 def compress(data: Whitened, scales: Scales, mode: np.ndarray) -> tuple[Whitened, Basis]:
     """The same data with each group's weights turned to principal directions; what the data cannot see is set apart."""
-    turn, rest, group, rest_group = [], [], [], []
+    turn: list[np.ndarray] = []
+    rest: list[np.ndarray] = []
+    group: list[np.ndarray] = []
+    rest_group: list[np.ndarray] = []
     for k in range(scales.mean.size):
         own = np.flatnonzero(scales.group == k)
         if not own.size:

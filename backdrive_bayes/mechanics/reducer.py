@@ -7,7 +7,7 @@ refined where the loops are steep; together they hold any odd settled loop at th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -59,6 +59,7 @@ class ReducerClass:
 
     knots: np.ndarray
     modules: tuple[str, ...] = BASELINE
+    parts: tuple[Part, ...] = field(init=False)
 
     def __post_init__(self):
         unknown = [m for m in self.modules if m not in BASELINE]
@@ -67,9 +68,13 @@ class ReducerClass:
         made = (_elastic(), _friction(), _clearance(self.knots), _free_play(self.knots))
         object.__setattr__(self, "parts", tuple(p for p in made if p.module in self.modules))
 
-    def part(self, name: str) -> Part | None:
-        """A part by name, None where its module is left out."""
-        return next((p for p in self.parts if p.name == name), None)
+    def part(self, name: str) -> Part:
+        """A part by name; its module must not be left out."""
+        return next(p for p in self.parts if p.name == name)
+
+    def has(self, name: str) -> bool:
+        """Whether the class holds a part of this name."""
+        return any(p.name == name for p in self.parts)
 
     def columns(self, history: History, exponents=(0.0, 0.0), log_rate: float = 0.0) -> dict[str, np.ndarray]:
         """Block means of every part's columns, (blocks, weights) by name.
@@ -97,12 +102,12 @@ class ReducerClass:
         ``clearance_weights`` (cells,) are the present weights of the clearance, that a zone's state moves.
         """
         found = {}
-        if self.part("friction"):
+        if self.has("friction"):
             plays = [Cells(*(np.array([v]) for v in (r - TOP, -r - TOP, 2 * TOP, 2.0))) for r in INITIAL_THRESHOLDS]
             neutral, upper, lower = (np.hstack([p.means(history, s) for p in plays]) for s in ("neutral", "upper", "lower"))
             found["initial"] = np.hstack([upper - neutral, lower - neutral])
-        part = self.part("clearance")
-        if part:
+        if self.has("clearance"):
+            part = self.part("clearance")
             cells = self._cells(part, exponents, log_rate)
             moved = cells.means(history, "upper") - cells.means(history)
             weights = (
