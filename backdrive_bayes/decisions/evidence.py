@@ -30,6 +30,10 @@ class Draws(Protocol):
     """What evidence asks of draws; :class:`~backdrive_bayes.indicators.draws.IndicatorDraws` is it for a posterior."""
 
     @property
+    def posterior(self) -> Posterior:
+        """What they are draws of."""
+
+    @property
     def rates(self) -> np.ndarray:
         """Loading rates of the records [N·m/s]."""
 

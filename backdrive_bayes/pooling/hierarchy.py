@@ -88,7 +88,7 @@ def _log_evidence(mean, spread, weight, unit_mean, unit_sd):
     return log_sum(parts)
 
 
-def _beginning(units):
+def _beginning(units) -> tuple[np.ndarray, np.ndarray]:
     """Where the first proposals are made, by moments, and the root of their covariance."""
     moments = np.array([u.moments for u in units])
     own2 = float(np.mean(moments[:, 1] ** 2))

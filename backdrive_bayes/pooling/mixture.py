@@ -62,13 +62,16 @@ def fit_mixture(x, weight=None) -> Mixture:
     weight = np.ones(x.size) if weight is None else np.asarray(weight, float)
     share = weight / weight.sum()
     effective = 1.0 / np.sum(share**2)
-    best, criterion = None, -np.inf
-    for count in range(1, MOST + 1):
-        mixture, height = _maximised(x, share, count)
-        found = effective * height - 0.5 * (3 * count - 1) * np.log(effective)
-        if found <= criterion:
+
+    def criterion(count, height):
+        return effective * height - 0.5 * (3 * count - 1) * np.log(effective)
+
+    best, height = _maximised(x, share, 1)
+    for count in range(2, MOST + 1):
+        mixture, found = _maximised(x, share, count)
+        if criterion(count, found) <= criterion(count - 1, height):
             break
-        best, criterion = mixture, found
+        best, height = mixture, found
     return best
 
 

@@ -76,7 +76,7 @@ def pool_quantity(names, draws, priors, seed: int, level: float) -> dict:
     units = [likelihood(forward(d), forward(p)) for d, p in zip(draws, priors, strict=True)]
     rows = [_row(name, d, u, level) for name, d, u in zip(names, draws, units, strict=True)]
     kept = [i for i, u in enumerate(units) if not u.refused]
-    found = {"scale": "log" if log else "linear", "units": len(kept), "refused": None, "of_units": rows}
+    found: dict = {"scale": "log" if log else "linear", "units": len(kept), "refused": None, "of_units": rows}
     if len(kept) < FEWEST_UNITS:
         return found | {"refused": _too_few(len(kept), rows)}
     hierarchy = sample_hierarchy([units[i].mixture for i in kept], seed)

@@ -7,6 +7,7 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -74,7 +75,7 @@ def _parse(path: Path, dialect: Dialect, wanted: list[str]) -> tuple[list[np.nda
     import pandas  # imported here: it costs a quarter of a second that --help need not pay
 
     positions = [dialect.headers.index(name) for name in wanted]
-    options = dict(
+    options: dict[str, Any] = dict(
         sep=dialect.separator,
         decimal=dialect.decimal,
         encoding=dialect.encoding,
