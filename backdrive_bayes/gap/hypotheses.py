@@ -50,7 +50,7 @@ def weigh(linear: Linear, allowed=None) -> Weighed:
     A clear wave is first taken into the linear model, because it leaves residuals that bend everything else.
     """
     found = _weigh(linear, allowed)
-    best = max(found.log_factor, key=found.log_factor.get)
+    best = max(found.log_factor, key=lambda h: found.log_factor[h])
     if ENCODER in best and found.log_factor[best] > CLEAR:
         wave = wave_group(linear, found.frequency[best])
         again = linearise(linear.reduced, linear.effects, linear.reducer.modules, (Group("wave", wave.columns),))
@@ -77,7 +77,7 @@ def _weigh(linear: Linear, allowed) -> Weighed:
     jumps = find_jumps(linear)
     table = _Table(linear, contrasts, jumps.log_factor > 0)
     names = [n for n in (*table.terms, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
-    log = {(): table.log_marginal(())}
+    log: dict[tuple[str, ...], float] = {(): table.log_marginal(())}
     for name in names:
         log[(name,)] = table.log_marginal((name,)) + (jumps.log_factor if name == STICK_SLIP else 0.0)
     best = sorted(names, key=lambda n: -log[(n,)])[:PAIRED]
@@ -157,8 +157,8 @@ class _Table:
                 scale = self.scale(on, size)
                 scale[self._columns(bank, width)[at]] = member * WAVE
                 found.append(self.contrasts.log_marginal(scale))
-        found = np.reshape(found, (-1, SIZES.size))
-        return float((averaged([averaged(f) for f in found]) if on else averaged(found[0])) - price), at
+        by_size = np.reshape(found, (-1, SIZES.size))
+        return float((averaged([averaged(f) for f in by_size]) if on else averaged(by_size[0])) - price), at
 
     def _scan(self, on, bank, width) -> np.ndarray:
         """Approximate gain of every member of a bank beside the terms ``on``."""
@@ -171,7 +171,7 @@ class _Table:
         lower = cholesky(inner, lower=True, check_finite=False)
         seen = solve_triangular(lower, scale[own] * c.moment[own], lower=True, check_finite=False)
         across = solve_triangular(lower, scale[own, None] * c.gram[np.ix_(own, index.ravel())], lower=True, check_finite=False)
-        precision = (c.noise_dof + c.samples) / (c.noise_dof + max(c.total - seen @ seen, 0.0))
+        precision = (c.noise_dof + c.samples) / (c.noise_dof + max(c.total - float(seen @ seen), 0.0))
         left = (c.moment[index.ravel()] - across.T @ seen).reshape(index.shape)
         members = across.T.reshape(*index.shape, own.size)
         gram = c.gram[index[:, :, None], index[:, None, :]] - np.einsum("fim,fjm->fij", members, members)

@@ -131,7 +131,7 @@ def _unevenness(linear: Linear) -> float:
 def _beside_effects(weighed: Weighed) -> Linear:
     """The linear model solved with the effects that are likeliest, all others at trace level."""
     joint = probabilities(weighed.log_factor, weighed.left, {})
-    best = max((h for h in joint if h in weighed.log_factor), key=joint.get)
+    best = max((h for h in joint if h in weighed.log_factor), key=lambda h: joint[h])
     linear = with_columns(weighed, best)
     scales = linear.design.scales(levels(linear, best))
     start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
