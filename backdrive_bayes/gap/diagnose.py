@@ -36,12 +36,13 @@ SHOWN = ("lost_motion_rad", "loop_area_J", "dissipation_ratio")
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found: the contract's object, the effects of the chosen model, and its posterior, which is the one that was
-    computed."""
+    """What was found: the contract's object, the effects of the chosen model, its posterior, which is the one that was
+    computed, and the weighed unit that it rests on."""
 
     json: dict
     effects: tuple[str, ...]
     posterior: Posterior
+    weighed: Weighed
 
 
 def diagnose(
@@ -156,7 +157,7 @@ class _Found:
             "residual": self._residual(before, after),
             "convergence": posterior.convergence.to_json(),
         }
-        return Diagnosis(json, listed, posterior)
+        return Diagnosis(json, listed, posterior, self.weighed)
 
     def _labels(self):
         modules = set(self.withheld)

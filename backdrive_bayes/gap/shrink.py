@@ -70,18 +70,28 @@ class Shrink:
         are the value.
         """
         own = np.full(self.fold.size, True) if fold is None else self.fold == fold
-        folds, number = np.unique(self.fold[own], return_inverse=True)
-        weight = rng.standard_exponential((RESAMPLED, number.size))
-        if folds.size > 1:
-            weight *= rng.standard_exponential((RESAMPLED, folds.size))[:, number]
-        weight = np.concatenate([np.ones((1, number.size)), weight])
+        weight = resampled(self.fold[own], rng)
         share = weight @ self.share[own]
         fraction = closed_fraction(*(weight @ getattr(self, name)[own] / share for name in ("before", part, "floor")))
-        middle = float(fraction[0])
-        if number.size < FEWEST_PIECES:
-            return {"median": middle, "lo": middle, "hi": middle}
-        lo, hi = np.quantile(fraction, [0.5 - level / 2, 0.5 + level / 2])
-        return {"median": middle, "lo": min(float(lo), middle), "hi": max(float(hi), middle)}
+        return about_first(fraction, level, weight.shape[1])
+
+
+def resampled(fold, rng) -> np.ndarray:
+    """Weights of a Bayesian bootstrap over folds and pieces, (resamples, pieces), all one in the first row."""
+    folds, number = np.unique(fold, return_inverse=True)
+    weight = rng.standard_exponential((RESAMPLED, number.size))
+    if folds.size > 1:
+        weight *= rng.standard_exponential((RESAMPLED, folds.size))[:, number]
+    return np.concatenate([np.ones((1, number.size)), weight])
+
+
+def about_first(values, level: float, pieces: int) -> dict:
+    """The first value with the central interval of all of them, which is that value where the pieces are too few."""
+    middle = float(values[0])
+    if pieces < FEWEST_PIECES:
+        return {"median": middle, "lo": middle, "hi": middle}
+    lo, hi = np.quantile(values, [0.5 - level / 2, 0.5 + level / 2])
+    return {"median": middle, "lo": min(float(lo), middle), "hi": max(float(hi), middle)}
 
 
 def shrink(linear: Linear, before: Fitted, after: Fitted, weight) -> Shrink:
