@@ -27,7 +27,6 @@ class Answer:
     gap: float | None = None
     cells: tuple[dict, ...] = ()
     closed: float | None = None
-    seconds: float | None = None
 
     @property
     def top(self) -> str | None:
@@ -39,16 +38,16 @@ def read_answer(path: Path) -> Answer:
     """An answer's file; one that cannot be understood is an answer that failed."""
     kept = read_result(path, ANSWER_SCHEMA)
     if "diagnosis" not in kept:
-        return Answer(None, kept.get("error") or "no answer", seconds=kept.get("seconds"))
-    return understand(kept["diagnosis"], kept.get("seconds"))
+        return Answer(None, kept.get("error") or "no answer")
+    return understand(kept["diagnosis"])
 
 
-def understand(diagnosis: dict, seconds: float | None = None) -> Answer:
+def understand(diagnosis: dict) -> Answer:
     """The object of diagnosis.json as an :class:`Answer`."""
     try:
         reason = diagnosis.get("inconclusive")
         if reason:
-            return Answer(None, f"inconclusive: {reason}", seconds=seconds)
+            return Answer(None, f"inconclusive: {reason}")
         probabilities = _probabilities(diagnosis["which"])
         answer, where, shrink = diagnosis["answer"], diagnosis.get("where") or {}, diagnosis.get("shrink") or {}
         return Answer(
@@ -59,10 +58,9 @@ def understand(diagnosis: dict, seconds: float | None = None) -> Answer:
             _number(diagnosis["gap"]["probability"]),
             tuple(where.get("map") or ()),
             _number((shrink.get("closed_fraction") or {}).get("median")),
-            seconds,
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        return Answer(None, f"not a diagnosis: {type(error).__name__} {error}", seconds=seconds)
+        return Answer(None, f"not a diagnosis: {type(error).__name__} {error}")
 
 
 def canonical(item) -> str:

@@ -6,7 +6,7 @@ from backdrive_bayes.blind import naming
 from backdrive_bayes.blind.answers import Answer
 from backdrive_bayes.blind.calibration import calibration
 from backdrive_bayes.blind.case import Case, match
-from backdrive_bayes.blind.intervals import LEVEL, mean_of
+from backdrive_bayes.blind.intervals import LEVEL
 from backdrive_bayes.blind.marks import judge_all
 from backdrive_bayes.blind.shrinking import closed_scores, removed_scores, unit_overlap, where_scores
 
@@ -25,7 +25,6 @@ def score(
         "interval_level": LEVEL,
         "counts": {"units": len(key["units"]), "answered": len(known), "failed": len(cases) - len(known)},
         "failures": [{"unit": c.entry["unit"], "error": c.answer.error} for c in cases if c.answer.label is None],
-        "seconds": mean_of(c.answer.seconds for c in cases if c.answer.seconds is not None),
         "top_1": naming.top_1(cases),
         "pairs": naming.pairs(cases),
         "power": naming.power(cases),
@@ -60,6 +59,5 @@ def _row(case: Case) -> dict:
         "gap_probability": answer.gap,
         "overlap": unit_overlap(case, "remainder"),
         "closed_fraction": answer.closed,
-        "seconds": answer.seconds,
         "error": answer.error,
     }

@@ -112,9 +112,7 @@ def _answer(study, kind, calls, opened):
         nonlocal done
         done += 1
         body = {"error": outcome.error} if outcome.error else {"diagnosis": outcome.value}
-        study.write(
-            folder / f"{name}.json", {"schema": ANSWER_SCHEMA, "unit": name, "seconds": round(outcome.seconds, 2), **body}
-        )
+        study.write(folder / f"{name}.json", {"schema": ANSWER_SCHEMA, "unit": name, **body})
         raised = f": {name} raised" if outcome.error else ""
         study.note(f"diagnosed {done} of {len(calls)} units ({kind}){raised}", done / len(calls))
 

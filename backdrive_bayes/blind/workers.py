@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -16,11 +15,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one call: its ``value``, or the ``error`` that it raised in words; ``seconds`` that it took."""
+    """What became of one call: its ``value``, or the ``error`` that it raised in words."""
 
     value: Any
     error: str | None
-    seconds: float
 
 
 def run_all(function: Callable, calls: Mapping[str, tuple], workers: int, done: Callable[[str, Outcome], None]) -> None:
@@ -38,7 +36,7 @@ def run_all(function: Callable, calls: Mapping[str, tuple], workers: int, done: 
     if not _run_pool(function, dict(left), workers, finished):
         for name, arguments in dict(left).items():
             if not _run_pool(function, {name: arguments}, 1, finished):
-                finished(name, Outcome(None, "the process died", 0.0))
+                finished(name, Outcome(None, "the process died"))
 
 
 def _run_pool(function, calls, workers, finished) -> bool:
@@ -76,9 +74,8 @@ def _begin(threads: int) -> None:
 
 
 def _guarded(function, arguments) -> Outcome:
-    start = time.monotonic()
     try:
         value, error = function(*arguments), None
     except Exception as raised:
         value, error = None, " ".join(f"{type(raised).__name__}: {raised}".split())
-    return Outcome(value, error, time.monotonic() - start)
+    return Outcome(value, error)

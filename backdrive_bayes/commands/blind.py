@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import time
 from pathlib import Path
 
 from backdrive_bayes.blind.seal import UNITS
 from backdrive_bayes.commands.output import say, write_json
 from backdrive_bayes.commands.progress import progress
-from backdrive_bayes.commands.results import stamped
+from backdrive_bayes.commands.results import keep_run, stamped
 from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.errors import BadInput, MissingExtra
 
@@ -41,7 +42,7 @@ def run(args) -> int:
     from backdrive_bayes.blind.diagnosing import diagnose_folder
     from backdrive_bayes.blind.study import Study, run_study
 
-    request, out = _request(args), args.out or Path("blind")
+    began, request, out = time.perf_counter(), _request(args), args.out or Path("blind")
     again = [_count(name, value, args.units) for name, value in (("--oracle", args.oracle), ("--removed", args.removed))]
     if args.workers < 1:
         raise BadInput("--workers", "a number from 1", args.workers)
@@ -51,6 +52,7 @@ def run(args) -> int:
     write_json(out / NAME, result)
     if not args.no_figures:
         _draw(out)
+    keep_run(out, "blind", began)
     _summarise(result, out)
     return result["outcome"]["exit_code"]
 

@@ -42,7 +42,7 @@ def says(label, p=0.9, credible=None, closed=0.9, gap=None, cells=()):
     others = [name for name in LABELS if name != label]
     probabilities = {label: p} | dict.fromkeys(others, (1 - p) / len(others))
     gap = float(label != "none") if gap is None else gap
-    return Answer(label, None, probabilities, tuple(credible or [label]), gap, tuple(cells), closed, 1.0)
+    return Answer(label, None, probabilities, tuple(credible or [label]), gap, tuple(cells), closed)
 
 
 def replies(key, answer):

@@ -19,6 +19,12 @@ def guess(folder, allowed):
     }
 
 
+def keys_of(value):
+    """Every key at any depth."""
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return {*(value if isinstance(value, dict) else ()), *(key for item in inner for key in keys_of(item))}
+
+
 def test_a_check_writes_scores_and_figures(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("backdrive_bayes.blind.diagnosing.diagnose_folder", guess)
     out = tmp_path / "check"
@@ -29,6 +35,8 @@ def test_a_check_writes_scores_and_figures(tmp_path, capsys, monkeypatch):
     assert sum(map(sum, result["confusion"]["counts"])) == 3 and len(result["units"]) == 3
     assert {p.stem for p in (out / "figures").iterdir()} == {"confusion", "power", "reliability", "sets"}
     text = capsys.readouterr().out
+    kept = {p.name: json.loads(p.read_text()) for p in out.rglob("*.json")}
+    assert [name for name, found in kept.items() if "seconds" in keys_of(found)] == ["run.json"]
     assert "3 units diagnosed, 0 without an answer" in text and "MISSED" in text
     assert main(["report", str(out)]) == 0 and (out / "report.pdf").read_bytes().startswith(b"%PDF")
 
