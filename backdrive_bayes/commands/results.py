@@ -9,10 +9,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from threadpoolctl import threadpool_limits
-
 from backdrive_bayes.commands.door import add_force_argument, ready_unit
 from backdrive_bayes.commands.output import say, write_json
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.results import CHECK, DIAGNOSIS, read_result, require_same_data
 
@@ -70,7 +69,7 @@ def add_fit_arguments(parser) -> None:
     add_force_argument(parser)
 
 
-@threadpool_limits.wrap(1, user_api="blas")  # sums in another order would change last bits
+@one_thread()
 def fit_unit(unit, options: FitOptions, note=lambda text: None, posterior=None):
     """Posterior of a unit and its indicators object, with the classic fit and the unit's own words.
 

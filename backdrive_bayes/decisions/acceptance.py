@@ -22,6 +22,7 @@ from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, large
 from backdrive_bayes.decisions.next_step import advice, repeats_to_settle
 from backdrive_bayes.decisions.pool import Pool
 from backdrive_bayes.decisions.structure import Structure, weigh
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.results import VERDICT
@@ -50,6 +51,7 @@ class Judged:
         return [(v >= self.limit.lo) & (v <= self.limit.hi) for v in self.values]
 
 
+@one_thread()
 def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
     """The verdict object of a unit from one or several models' draws.
 

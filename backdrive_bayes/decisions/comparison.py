@@ -11,6 +11,7 @@ from backdrive_bayes.decisions.claims import Claims, answer
 from backdrive_bayes.decisions.conformance import share
 from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
 from backdrive_bayes.decisions.loops import Loop, NotAvailable
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
@@ -31,6 +32,7 @@ class Matched:
     second: Loop
 
 
+@one_thread()
 def compare(evidences, claims: Claims | None = None, rope: float = ROPE, level: float = 0.9, seed: int = 0) -> dict:
     """The comparison object of two or more units.
 

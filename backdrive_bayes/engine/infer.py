@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linearise import Linear, linearise
 from backdrive_bayes.engine.marginal import find_scales
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.engine.reduced import Reduced, reduce_unit
 from backdrive_bayes.engine.sample import sample
@@ -31,25 +31,25 @@ def library_terms():
     return (*(term for terms in all_effects().values() for term in terms), *BENCH)
 
 
+@one_thread()
 def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda text: None) -> Linear:
     """The linear model of a unit about its mode."""
-    with threadpool_limits(1, user_api="blas"):
-        note("reducing the records")
-        reduced = reduce_unit(without_wild(unit))
-        note("finding the mode")
-        return linearise(reduced, library_terms(), modules)
+    note("reducing the records")
+    reduced = reduce_unit(without_wild(unit))
+    note("finding the mode")
+    return linearise(reduced, library_terms(), modules)
 
 
+@one_thread()
 def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=lambda text: None) -> Posterior:
     """Posterior of a unit.
 
     ``hypothesis`` names effects that are present while all others stay at trace level.
     """
-    with threadpool_limits(1, user_api="blas"):
-        scales = linear.design.scales(levels(linear, hypothesis))
-        start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
-        mode, solution = find_scales(linear.data, scales, start)
-        drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWER)
+    scales = linear.design.scales(levels(linear, hypothesis))
+    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
+    mode, solution = find_scales(linear.data, scales, start)
+    drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWER)
     reduced, names = linear.reduced, linear.design.names
     return Posterior(
         unit_name=reduced.unit.name,

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.predictive import block_offsets
 from backdrive_bayes.errors import BadInput
@@ -20,6 +21,7 @@ SLACK = 0.02
 """Share by which a torque may pass the largest measured one without being beyond it."""
 
 
+@one_thread()
 def predict_angles(posterior: Posterior, time_s, torque_nm, start: str = "unknown", draws: int = 400) -> np.ndarray:
     """Curves of the angle [rad] at :func:`nodes` of a torque history, shape (about ``draws``, nodes).
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.infer import infer, prepare
 from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.periodic import wave_group
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities
@@ -44,7 +44,7 @@ def weighed_unit(unit: Unit, modules=BASELINE, allowed=None, note=lambda text: N
 
 def fit_posterior(unit: Unit, modules=BASELINE, seed: int = 0, note=lambda text: None) -> Posterior:
     """Posterior of a unit, averaged over what may break the symmetries of its class, the model discrepancy included."""
-    with threadpool_limits(1, user_api="blas"):
+    with one_thread():
         weighed = weighed_unit(unit, tuple(modules), None, note)
         joint = probabilities.probabilities(weighed.log_factor, weighed.left, {})
         likeliest = sorted(joint.items(), key=lambda item: -item[1])[:MOST]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import expit
-from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import next_test, probabilities, where
@@ -58,8 +58,7 @@ def diagnose(
 
     ``allowed`` names the effects of the library (default: all). BadInput where the unit cannot be read as a test.
     """
-    # The arrays are small: BLAS threads would spend their time waiting for each other.
-    with threadpool_limits(1, user_api="blas"):
+    with one_thread():
         return _diagnose(unit, tuple(baseline), seed, allowed, k, progress)
 
 

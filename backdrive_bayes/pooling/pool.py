@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 
 from backdrive_bayes.decisions.loops import measured_loops
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import CORE
 from backdrive_bayes.indicators.intervals import LEVEL
@@ -17,6 +18,7 @@ from backdrive_bayes.pooling.unit import Told, UnitDraws
 from backdrive_bayes.results import POOL
 
 
+@one_thread()
 def pool_batch(batch: str, units: list[UnitDraws], seed: int = 0, level: float = LEVEL) -> dict:
     """The object of pool.json. BadInput where fewer units than a hierarchy needs can be compared.
 
