@@ -53,7 +53,6 @@ class FleetFile(Struct, kw_only=True):
     effects: dict[str, Count] = field(default_factory=dict)
     same_names: Any = None
     batches: dict[str, Any] | None = None
-    weight: Number = None
 
 
 class PoolFile(Struct, kw_only=True):
