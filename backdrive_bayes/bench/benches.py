@@ -13,7 +13,7 @@ BENCHES: dict[str, str] = {
     "ode": "backdrive_bayes.bench.ode",
     "mujoco": "backdrive_bayes.bench.engine",
 }
-"""Name -> package with MECHANICS, in itself or in its module ``mechanics``."""
+"""Name -> package with MECHANICS."""
 
 DEFAULT_BENCH = "sliders"
 
@@ -22,10 +22,8 @@ def find_bench(name: str) -> Mechanics:
     """Mechanics of a bench; BadInput for a name that is none, or where a package that it needs is not installed."""
     if name not in BENCHES:
         raise BadInput("bench", f"one of {', '.join(BENCHES)}", f"'{name}'")
-    package = BENCHES[name]
     try:
-        module = import_module(package)
-        return module.MECHANICS if hasattr(module, "MECHANICS") else import_module(f"{package}.mechanics").MECHANICS
+        return import_module(BENCHES[name]).MECHANICS
     except ImportError as error:
         missing = (error.name or "").split(".")[0]
         if missing == __name__.split(".")[0]:

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.channel_noise import ChannelNoise, angle_noise
+from backdrive_bayes.bench.channel_noise import FRACTION, ChannelNoise, angle_noise
 from backdrive_bayes.bench.draws import log_uniform
 
-FRACTION = 0.15
 SAMPLING_HZ = (200.0, 2000.0)
 CLOCKS, CLOCK_SHARES = ("even", "stamps", "uneven"), (0.6, 0.25, 0.15)
 _OFFSET_SD = 5.0

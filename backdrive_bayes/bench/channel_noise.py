@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
-from backdrive_bayes.bench.draws import log_uniform
+from backdrive_bayes.bench.draws import log_uniform, ornstein_uhlenbeck
+
+FRACTION = 0.15
+"""Share of a channel's noise that what hides in it may have at most: it stays below what can be told."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,5 @@ def draw_noise(rng, reducer) -> ChannelNoise:
 
 def angle_noise(rng, samples: int, step_s: float, noise: ChannelNoise):
     """White noise plus a stationary Ornstein-Uhlenbeck process [rad], shape (samples,)."""
-    keep = np.exp(-step_s / noise.correlation_time_s)
-    push = rng.standard_normal(samples)
-    push[1:] *= np.sqrt(1.0 - keep**2)
-    slow = lfilter([1.0], [1.0, -keep], push)
+    slow = ornstein_uhlenbeck(rng, samples, np.exp(-step_s / noise.correlation_time_s))
     return noise.correlated_rad * slow + noise.white_rad * rng.standard_normal(samples)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import lfilter
 
 
 def log_uniform(rng, low: float, high: float) -> float:
@@ -13,3 +14,10 @@ def log_uniform(rng, low: float, high: float) -> float:
 def sign(rng) -> float:
     """-1 or 1."""
     return float(rng.choice([-1.0, 1.0]))
+
+
+def ornstein_uhlenbeck(rng, samples: int, keep: float):
+    """A stationary first-order process of unit variance, shape (samples,), of which a step keeps the share ``keep``."""
+    push = rng.standard_normal(samples)
+    push[1:] *= np.sqrt(1.0 - keep**2)
+    return lfilter([1.0], [1.0, -keep], push)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform, sign
+
 
 @dataclass(frozen=True)
 class Loop:
@@ -24,18 +26,18 @@ class Plan:
     sampling_hz: float | None = None
 
 
-DEFAULT_PLAN = Plan((Loop(rate=0.1), Loop(rate=0.5), Loop(rate=1.0)))
-
-
 def make_plan(rates=(0.1, 0.5, 1.0), amplitudes=(1.0,), cycles=1, sampling_hz: float | None = 1000.0) -> Plan:
     """One record for each rate at each amplitude; units as in :class:`Loop`."""
     return Plan(tuple(Loop(a, r, cycles) for a in amplitudes for r in rates), sampling_hz)
 
 
+DEFAULT_PLAN = make_plan(sampling_hz=None)
+
+
 def random_plan(rng) -> Plan:
     """A plan such as benches run: mostly three rates, else sweeps, several cycles, unequal rates, one record."""
     kind = rng.choice(["rates", "sweep", "cycles", "unequal", "single"], p=[0.5, 0.15, 0.15, 0.1, 0.1])
-    base = float(np.exp(rng.uniform(np.log(0.08), np.log(0.4))))
+    base = log_uniform(rng, 0.08, 0.4)
     if kind == "rates":
         return make_plan((base, 5 * base, 10 * base), sampling_hz=None)
     if kind == "sweep":
@@ -80,7 +82,7 @@ def draw_past(rng, amplitude: float) -> tuple[float, ...]:
     """Turning torques of the reducer's past as shares of the rated torque: none, one side, both, or loops within the loop."""
     turns = int(rng.choice([0, 1, 2, 3, 4]))
     sizes = rng.uniform(0.5, 1.0, turns) if turns < 3 else np.sort(rng.uniform(0.1, 1.0, turns))[::-1]
-    levels = amplitude * rng.choice([-1.0, 1.0]) * sizes * (-1.0) ** np.arange(turns)
+    levels = amplitude * sign(rng) * sizes * (-1.0) ** np.arange(turns)
     return tuple(float(level) for level in levels)
 
 

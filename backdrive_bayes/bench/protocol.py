@@ -50,8 +50,12 @@ DrawEffect = Callable[[np.random.Generator, Any], BenchEffect]
 
 
 class Mechanics(Protocol):
-    """One bench's mechanics. A reducer is a frozen dataclass of its own with at least ``rated_torque_nm``, ``angle_rad``
-    (about half the loop's angle range at T_r) and ``reduction_ratio``."""
+    """One bench's mechanics.
+
+    A reducer is a frozen dataclass of its own with at least ``rated_torque_nm``, ``angle_rad`` (about half the loop's angle range
+    at T_r), ``reduction_ratio``, and ``turned(held=())``: what a fit could re-tune, the reducer with each parameter in turn
+    moved by a small physical step (about 2 %), where ``held`` names effects whose like is not to be turned.
+    """
 
     name: str
     """Name on the command line."""
@@ -70,10 +74,4 @@ class Mechanics(Protocol):
 
         Deterministic in its arguments. The commanded torque is ``where.path.torque_at(time)``, which is also what an honest
         torque sensor reads.
-        """
-
-    def turned(self, reducer, held: tuple[str, ...] = ()) -> tuple[Any, ...]:
-        """The reducer with each of its parameters in turn moved by a small physical step (about 2 %).
-
-        What a fit could re-tune; ``held`` names effects whose like is not to be turned.
         """

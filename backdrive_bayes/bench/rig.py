@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
-from backdrive_bayes.bench.channel_noise import ChannelNoise
-from backdrive_bayes.bench.draws import log_uniform
+from backdrive_bayes.bench.channel_noise import FRACTION, ChannelNoise
+from backdrive_bayes.bench.draws import log_uniform, ornstein_uhlenbeck
 from backdrive_bayes.bench.plan import Path
 
-FRACTION = 0.15
 _CABLE_STEPS = 2000
 
 
@@ -84,10 +82,8 @@ def _cable(rig, time_s, turned):
 
 def _crossing(rng, rig, time_s, path: Path):
     """Stationary Ornstein-Uhlenbeck process over the torque travelled [N·m], shape (samples,)."""
-    step = rig.crossing_distance_nm / 4.0
+    per_distance = 4.0
+    step = rig.crossing_distance_nm / per_distance
     nodes = int(np.ceil(path.rate_nm_per_s * path.end_s / step)) + 2
-    keep = np.exp(-0.25)
-    push = rng.standard_normal(nodes)
-    push[1:] *= np.sqrt(1.0 - keep**2)
-    course = lfilter([1.0], [1.0, -keep], push)
+    course = ornstein_uhlenbeck(rng, nodes, np.exp(-1.0 / per_distance))
     return rig.crossing_nm * np.interp(path.rate_nm_per_s * time_s, step * np.arange(nodes), course)

@@ -19,7 +19,7 @@ FULL = (8.0, 15.0)
 """Range of the height at severity 1, in total noise standard deviations."""
 
 REACH_STEPS = 50
-"""How far a parameter may be turned to make an effect look smaller, in steps of ``Mechanics.turned``."""
+"""How far a parameter may be turned to make an effect look smaller, in steps of a reducer's ``turned``."""
 
 SAMPLES = 1200
 
@@ -68,8 +68,7 @@ def make_yardstick(mechanics: Mechanics, reducer, records, noise: ChannelNoise, 
     plain = coarse_angle(mechanics, reducer, (), records)
     slopes = [_slope(a, r) for a, r in zip(np.split(plain, len(records)), records, strict=True)]
     noise_rad = noise.total_rad(np.concatenate(slopes))
-    turned = mechanics.turned(reducer, tuple(absent))
-    columns = [coarse_angle(mechanics, other, (), records) - plain for other in turned]
+    columns = [coarse_angle(mechanics, other, (), records) - plain for other in reducer.turned(tuple(absent))]
     columns += _offsets_and_states(mechanics, reducer, records, plain)
     left, size, _ = np.linalg.svd(np.column_stack(columns) / noise_rad[:, None], full_matrices=False)
     kept = size > 1e-6 * size[0]

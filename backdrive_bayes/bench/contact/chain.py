@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-NO_STICK = np.array([0.0, 0.0, 0.0, 0.0])
-
 
 class Chain(NamedTuple):
     """Stages in series from the output shaft (0) to the locked input; each has ``flanks`` contacts on either side.
@@ -38,7 +36,7 @@ class Chain(NamedTuple):
     bearing_onset: float = 0.0
     worn: float = 0.0
     wear: float = 0.0
-    stick: np.ndarray = NO_STICK
+    stick: np.ndarray = np.zeros(4)
 
 
 def contact_stiffness(open_angle, power, film, deflection, load=1.0):

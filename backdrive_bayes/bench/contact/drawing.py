@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.bench.contact.reducer import ContactReducer
+from backdrive_bayes.bench.draws import log_uniform
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,6 @@ def draw_reducer(rng, kind: str | None = None, without: tuple[str, ...] = ()) ->
         compliance_ratio=log_uniform(rng, 0.3, 1.0),
         drag_ratio=log_uniform(rng, 0.3, 2.0),
     )
-
-
-def log_uniform(rng, low: float, high: float) -> float:
-    """A number between ``low`` and ``high``, uniform in its logarithm."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def _ranks(rng, flanks):

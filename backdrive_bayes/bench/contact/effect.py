@@ -12,9 +12,8 @@ import numpy as np
 
 from backdrive_bayes.bench.contact.chain import Chain
 from backdrive_bayes.bench.contact.reducer import ContactReducer
+from backdrive_bayes.bench.draws import sign
 from backdrive_bayes.bench.protocol import BenchEffect, Circumstances
-
-NO_TIMES = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class ContactEffect(BenchEffect):
 
     def times_s(self, test: Test) -> np.ndarray:
         """Times [s] at which the acting torque bends and the path does not."""
-        return NO_TIMES
+        return np.zeros(0)
 
     def load(self, test: Test, time_s, load):
         """Acting torque (steps,)."""
@@ -81,8 +80,3 @@ def loaded_angle(rng, reducer: ContactReducer, low: float = 0.15, high: float = 
     """An output angle that the reducer passes under load, on either side, between these shares of the way to T_r."""
     free = reducer.clearance_share
     return sign(rng) * (free + (1.0 - free) * rng.uniform(low, high))
-
-
-def sign(rng) -> float:
-    """-1 or 1."""
-    return float(rng.choice([-1.0, 1.0]))

@@ -8,10 +8,9 @@ import numpy as np
 
 from backdrive_bayes.bench.contact.drawing import KINDS, draw_reducer
 from backdrive_bayes.bench.contact.effect import ContactEffect, Run, Test
-from backdrive_bayes.bench.contact.effects import EFFECTS
-from backdrive_bayes.bench.contact.reducer import ContactReducer, turned
+from backdrive_bayes.bench.contact.reducer import ContactReducer
+from backdrive_bayes.bench.contact.registry import EFFECTS, UNLISTED
 from backdrive_bayes.bench.contact.solver import STEP, follow
-from backdrive_bayes.bench.contact.unlisted import UNLISTED
 from backdrive_bayes.bench.protocol import Circumstances, DrawEffect
 
 LOAD_STEP = 0.006
@@ -38,10 +37,6 @@ class ContactMechanics:
         for effect in effects:
             reading = effect.read(test, time_s, reading)
         return reducer.angle_rad * reading
-
-    def turned(self, reducer: ContactReducer, held: tuple[str, ...] = ()) -> tuple[ContactReducer, ...]:
-        """The reducer with each of its parameters in turn moved by a small step."""
-        return turned(reducer, held)
 
 
 def run_chain(test: Test, effects=(), load_step: float = LOAD_STEP, largest_step: float = STEP) -> Run:

@@ -14,12 +14,7 @@ IN_PROPORTION = (
     "clearance_share", "elastic_share", "shaft_share", "gap_scatter", "film", "drag", "presliding", "flank_friction", "grip",
     "spread", "clearance_ratio", "compliance_ratio", "drag_ratio",
 )  # fmt: skip
-_HELD = {
-    "load_dependent_friction": ("flank_friction",),
-    "hardening_stiffness": ("exponent", "gap_scatter"),
-    "geometric": ("clearance_share", "clearance_ratio", "film"),
-    "friction": ("drag", "drag_ratio", "presliding", "spread", "grip"),
-}
+_HELD = {"load_dependent_friction": ("flank_friction",), "hardening_stiffness": ("exponent", "gap_scatter")}
 
 
 @dataclass(frozen=True)
@@ -95,13 +90,12 @@ class ContactReducer:
         """Angles of the bodies when every mesh floats at ``floating`` (-1 to 1) in its gap, shape (stages,)."""
         return np.cumsum((floating * self.half_gaps())[::-1])[::-1].copy()
 
-
-def turned(reducer: ContactReducer, held: tuple[str, ...] = ()) -> tuple[ContactReducer, ...]:
-    """The reducer with each parameter in turn greater by 2 % (exponent: by 0.02); ``held`` names effects not to be turned."""
-    kept = {name for effect in held for name in _HELD.get(effect, ())}
-    names = [name for name in IN_PROPORTION if name not in kept and getattr(reducer, name) != 0.0]
-    moved = [replace(reducer, **{name: 1.02 * getattr(reducer, name)}) for name in names]
-    return (*moved, *(() if "exponent" in kept else (replace(reducer, exponent=reducer.exponent + 0.02),)))
+    def turned(self, held: tuple[str, ...] = ()) -> tuple[ContactReducer, ...]:
+        """The reducer with each parameter in turn greater by 2 % (exponent: by 0.02); ``held`` names effects not to be turned."""
+        kept = {name for effect in held for name in _HELD.get(effect, ())}
+        names = [name for name in IN_PROPORTION if name not in kept and getattr(self, name) != 0.0]
+        moved = [replace(self, **{name: 1.02 * getattr(self, name)}) for name in names]
+        return (*moved, *(() if "exponent" in kept else (replace(self, exponent=self.exponent + 0.02),)))
 
 
 def _sequence(ratio, stages):

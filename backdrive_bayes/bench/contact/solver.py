@@ -17,6 +17,12 @@ HALVINGS = 10
 
 
 @njit(cache=True)
+def _turned(angle, j):
+    """Turn of a mesh: of a body against the next one, of the last against the locked input."""
+    return angle[j] - (angle[j + 1] if j + 1 < angle.size else 0.0)
+
+
+@njit(cache=True)
 def _mesh(chain, j, turned, before, grip, opened):
     """Torque of a mesh and its slope; ``grip`` (flanks,) holds the tangential torques of the last step."""
     side = 1.0 if turned > 0.0 else -1.0
@@ -75,8 +81,8 @@ def _gradient(chain, load, angle, state, gradient, diagonal, coupling):
     stages = angle.size
     gradient[0] = -load
     for j in range(stages):
-        turned = angle[j] - (angle[j + 1] if j + 1 < stages else 0.0)
-        before = old[j] - (old[j + 1] if j + 1 < stages else 0.0)
+        turned = _turned(angle, j)
+        before = _turned(old, j)
         torque, slope = _mesh(chain, j, turned, before, grip[j], opened[j])
         friction, held = _bearing(chain, j, angle[j] - old[j], pull[j], load)
         gradient[j] += torque + friction
@@ -150,8 +156,8 @@ def _commit(chain, load, angle, state):
     old, grip, pull, opened, stuck = state
     stages, broke = angle.size, False
     for j in range(stages):
-        turned = angle[j] - (angle[j + 1] if j + 1 < stages else 0.0)
-        before = old[j] - (old[j + 1] if j + 1 < stages else 0.0)
+        turned = _turned(angle, j)
+        before = _turned(old, j)
         _regrip(chain, j, turned, before, grip[j], opened[j])
         extra = chain.bearing_load[j] * max(abs(load) - chain.bearing_onset, 0.0) / pull.shape[1]
         for m in range(pull.shape[1]):
@@ -184,7 +190,7 @@ def _torques(chain, load, angle, state, row):
     """Time row of the output: angle of the output shaft, then the torque that each mesh passes on."""
     row[1] = angle[0]
     for j in range(angle.size):
-        turned = angle[j] - (angle[j + 1] if j + 1 < angle.size else 0.0)
+        turned = _turned(angle, j)
         row[2 + j] = _mesh(chain, j, turned, turned, state[1][j], state[3][j])[0]
 
 

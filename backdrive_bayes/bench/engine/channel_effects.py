@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform, sign
 from backdrive_bayes.bench.engine.effect import EngineEffect
-from backdrive_bayes.bench.engine.reducer import log_uniform
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def draw_thermal_drift(rng, reducer):
     """A course, a time and a sign."""
     kind = str(rng.choice(["warm_up", "linear", "wave"]))
     period = log_uniform(rng, 40.0, 200.0) if kind == "wave" else log_uniform(rng, 30.0, 300.0)
-    return ThermalDrift(kind=kind, period_s=period, phase=float(rng.uniform(0, 2 * np.pi)), sign=float(rng.choice([-1.0, 1.0])))
+    return ThermalDrift(kind=kind, period_s=period, phase=float(rng.uniform(0, 2 * np.pi)), sign=sign(rng))
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class TorqueOffset(EngineEffect):
 def draw_torque_offset(rng, reducer):
     """A sensor's zero error or a weight on a lever."""
     tilt = float(rng.uniform(-0.8, 0.8)) if rng.uniform() < 0.4 else None
-    return TorqueOffset(sign=float(rng.choice([-1.0, 1.0])), tilt_rad=tilt)
+    return TorqueOffset(sign=sign(rng), tilt_rad=tilt)
 
 
 @dataclass(frozen=True)

@@ -49,9 +49,5 @@ class EngineMechanics:
             reading = effect.read(run, np.asarray(time_s), reading)
         return reading
 
-    def turned(self, reducer: EngineReducer, held: tuple[str, ...] = ()) -> tuple[EngineReducer, ...]:
-        """The reducer with each of its parameters in turn moved by about 2 %."""
-        return reducer.turned(tuple(held))
-
 
 MECHANICS = EngineMechanics()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform
 from backdrive_bayes.bench.engine.train import Link, Train
 
 BODIES = 7
@@ -53,7 +54,7 @@ class EngineReducer:
         links = tuple(Link(float(c), self.stiffening, float(width.get(i, 0.0)), self.crossing) for i, c in enumerate(soft))
         return Train(tuple(bearing.tolist()), tuple((self.load_friction * _shares(load)).tolist()), links)
 
-    def turned(self, held: tuple[str, ...]):
+    def turned(self, held: tuple[str, ...] = ()):
         """The reducer with each parameter in turn moved by about 2 %; see the protocol."""
         fixed = {"load_friction"} if "load_dependent_friction" in held else set()
         fixed |= {"stiffening"} if "hardening_stiffness" in held else set()
@@ -101,11 +102,6 @@ _RANGES = {
     "strain_wave": ((1.0, 1000.0), (0.4, 15.0), (0.0, 0.05), (0.01, 0.1), (0.01, 0.2), (0.02, 0.3), (1.3, 2.6)),
     "plastic": ((0.05, 5.0), (15.0, 360.0), (0.02, 0.8), (0.01, 0.15), (0.02, 0.25), (0.03, 0.35), (1.0, 2.0)),
 }
-
-
-def log_uniform(rng, low: float, high: float) -> float:
-    """A number between ``low`` and ``high``, uniform in its logarithm."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def _draw_gaps(rng, kind):

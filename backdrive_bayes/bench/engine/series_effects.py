@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform
 from backdrive_bayes.bench.engine.effect import EngineEffect
 from backdrive_bayes.bench.engine.hinge import Hinge, hinge_angle
-from backdrive_bayes.bench.engine.reducer import log_uniform
 
 
 @dataclass(frozen=True)

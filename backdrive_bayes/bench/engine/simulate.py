@@ -28,25 +28,10 @@ def _run(train, torque_bytes, step_bytes, floating):
     model, data, dashpots = build_train(train)
     data.qpos[:] = floating * np.cumsum([link.clearance for link in train.links][::-1])[::-1]
     rest = np.zeros(REST_STEPS)
-    special = train.static or train.running_in or train.cogging[0] or train.viscous
-    advance = _advance_with_extras if special else _advance
     step_s = np.r_[rest + 1.0, step_s] if step_s.size else np.ones(rest.size + torque.size)
     drag = np.outer(weight_of_dashpot(train.viscous / step_s), np.ones(len(dashpots))) if dashpots else None
-    found = advance(train, model, data, np.r_[rest, torque], (dashpots, drag))[REST_STEPS:]
+    found = _advance(train, model, data, np.r_[rest, torque], dashpots, drag)[REST_STEPS:]
     raise_if_unstable(data)
-    return found
-
-
-def _advance(train, model, data, torque, _):
-    """Output angle at every step; bearing friction follows the torque that each body passes on."""
-    step, applied, angle, first = load_engine().mj_step, data.qfrc_applied, data.qpos, model.neq
-    friction, constant, slope = model.dof_frictionloss, np.maximum(train.friction, 1e-9), np.array(train.load_friction)
-    found, level, stuck = np.empty(torque.size), np.ones(constant.size), np.zeros(constant.size)
-    for i, load in enumerate(torque.tolist()):
-        applied[0] = load
-        step(model, data)
-        found[i] = angle[0]
-        _press(friction, data.efc_force, first, load, constant, slope, level, stuck)
     return found
 
 
@@ -63,18 +48,18 @@ def _press(friction, row_force, first, load, constant, slope, level, stuck):
         friction[i] = (level[i] + stuck[i] * squeezed) * (constant[i] + slope[i] * abs(passed))
 
 
-def _advance_with_extras(train, model, data, torque, drag):
-    """As _advance, with static friction, bearing drag in true time, running-in and cogging."""
+def _advance(train, model, data, torque, dashpots, drag):
+    """Output angle at every step; bearing friction follows the torque that each body passes on and how it has slid."""
     step, applied, angle, speed, first = load_engine().mj_step, data.qfrc_applied, data.qpos, data.qvel, model.neq
     friction, constant, slope = model.dof_frictionloss, np.maximum(train.friction, 1e-9), np.array(train.load_friction)
-    (depth, period, phase), (dashpots, weights) = train.cogging, drag
+    depth, period, phase = train.cogging
     found, drive = np.empty(torque.size), _drive_speed(train, torque).tolist()
     level = np.ones(constant.size)
     stuck, slid, sliding = np.zeros((3, constant.size))
     for i, load in enumerate(torque.tolist()):
         applied[0] = load - depth * math.sin(2.0 * math.pi * angle[0] / period + phase)
         if dashpots:
-            model.tendon_invweight0[dashpots] = weights[i]
+            model.tendon_invweight0[dashpots] = drag[i]
         step(model, data)
         found[i] = angle[0]
         _slide(level, stuck, slid, sliding, speed, drive[i], train.static, train.running_in)

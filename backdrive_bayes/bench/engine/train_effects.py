@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform, sign
 from backdrive_bayes.bench.engine.effect import EngineEffect
 from backdrive_bayes.bench.engine.hinge import Hinge, hinge_angle
-from backdrive_bayes.bench.engine.reducer import log_uniform
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class AsymmetricStiffness(EngineEffect):
 
 def draw_asymmetric_stiffness(rng, reducer):
     """In the flanks of the links with clearance, where there are any."""
-    return AsymmetricStiffness(side=float(rng.choice([-1.0, 1.0])), in_train=bool(reducer.gaps) and rng.uniform() < 0.7)
+    return AsymmetricStiffness(side=sign(rng), in_train=bool(reducer.gaps) and rng.uniform() < 0.7)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class RateDependentFriction(EngineEffect):
 def draw_rate_dependent_friction(rng, reducer):
     """A law and, but for the viscous one, either sign."""
     law = str(rng.choice(["log", "stribeck", "viscous"]))
-    direction = {"log": float(rng.choice([-1.0, 1.0])), "stribeck": -1.0, "viscous": 1.0}[law]
+    direction = {"log": sign(rng), "stribeck": -1.0, "viscous": 1.0}[law]
     return RateDependentFriction(law=law, direction=direction, reference=log_uniform(rng, 0.2, 0.6))
 
 

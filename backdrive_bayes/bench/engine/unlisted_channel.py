@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform, sign
 from backdrive_bayes.bench.engine.effect import EngineEffect
-from backdrive_bayes.bench.engine.reducer import log_uniform
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class MountJump(EngineEffect):
 
 def draw_mount_jump(rng, reducer):
     """In the first record or in all."""
-    return MountJump(at=float(rng.uniform(0.25, 0.9)), record=int(rng.choice([-1, 0])), sign=float(rng.choice([-1.0, 1.0])))
+    return MountJump(at=float(rng.uniform(0.25, 0.9)), record=int(rng.choice([-1, 0])), sign=sign(rng))
 
 
 @dataclass(frozen=True)

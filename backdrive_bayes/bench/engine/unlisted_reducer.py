@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform, sign
 from backdrive_bayes.bench.engine.effect import EngineEffect
 from backdrive_bayes.bench.engine.hinge import Hinge, hinge_angle
-from backdrive_bayes.bench.engine.reducer import log_uniform
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class LiftOff(EngineEffect):
 
 def draw_lift_off(rng, reducer):
     """A preload and a side."""
-    return LiftOff(preload=float(rng.uniform(0.3, 0.8)), side=float(rng.choice([-1.0, 1.0])))
+    return LiftOff(preload=float(rng.uniform(0.3, 0.8)), side=sign(rng))
 
 
 @dataclass(frozen=True)
@@ -110,4 +110,4 @@ class ToothDefect(EngineEffect):
 def draw_tooth_defect(rng, reducer):
     """Anywhere in the range, on either side."""
     at = float(rng.uniform(0.15, 0.85) * rng.choice([-1.0, 1.0]))
-    return ToothDefect(at=at, width=log_uniform(rng, 0.03, 0.15), sign=float(rng.choice([-1.0, 1.0])))
+    return ToothDefect(at=at, width=log_uniform(rng, 0.03, 0.15), sign=sign(rng))

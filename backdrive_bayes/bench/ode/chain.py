@@ -29,20 +29,16 @@ class Chain(NamedTuple):
     table_extra: np.ndarray
     constant: np.ndarray
     ratio: np.ndarray
-    load_power: float
     bend: np.ndarray
     share: np.ndarray
-    exponent: float
-    viscous: float
-    bump: np.ndarray
-    rate_law: np.ndarray
-    creep_compliance: np.ndarray
-    creep_s: np.ndarray
-    creep_power: float
-
-
-NO_BUMP = np.array([0.0, 0.0, 1.0])
-NO_RATE = np.array([0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+    exponent: float = 1.0
+    load_power: float = 1.0
+    viscous: float = VISCOUS
+    bump: np.ndarray = np.array([0.0, 0.0, 1.0])
+    rate_law: np.ndarray = np.array([0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+    creep_compliance: np.ndarray = np.zeros(0)
+    creep_s: np.ndarray = np.ones(0)
+    creep_power: float = 1.0
 
 
 def stack_tables(tables):
@@ -58,45 +54,14 @@ def make_chain(reducer: OdeReducer) -> Chain:
     constant, ratio = reducer.levels()
     bend = reducer.presliding * np.array([1.0, reducer.bristle_ratio])
     share = np.array([1.0 - reducer.bristle_share, reducer.bristle_share])
-    nodes = constant.size
-    return Chain(
-        table_torque=torque,
-        table_travel=travel,
-        table_extra=np.zeros_like(torque),
-        constant=constant,
-        ratio=ratio,
-        load_power=1.0,
-        bend=np.tile(bend, (nodes, 1)),
-        share=np.tile(share, (nodes, 1)),
-        exponent=reducer.bristle_power,
-        viscous=VISCOUS,
-        bump=NO_BUMP,
-        rate_law=NO_RATE,
-        creep_compliance=np.zeros(0),
-        creep_s=np.ones(0),
-        creep_power=1.0,
-    )
+    tiled = (np.tile(row, (constant.size, 1)) for row in (bend, share))
+    return Chain(torque, travel, np.zeros_like(torque), constant, ratio, *tiled, reducer.bristle_power)
 
 
 def coupling(torque, travel, friction: float, bend: float) -> Chain:
     """A chain of one node: a spring with this table, and friction that rubs along its travel."""
-    return Chain(
-        table_torque=torque[None, :],
-        table_travel=travel[None, :],
-        table_extra=np.zeros((1, torque.size)),
-        constant=np.array([friction]),
-        ratio=np.zeros(1),
-        load_power=1.0,
-        bend=np.array([[bend]]),
-        share=np.ones((1, 1)),
-        exponent=1.0,
-        viscous=VISCOUS,
-        bump=NO_BUMP,
-        rate_law=NO_RATE,
-        creep_compliance=np.zeros(0),
-        creep_s=np.ones(0),
-        creep_power=1.0,
-    )
+    table = (torque[None, :], travel[None, :], np.zeros((1, torque.size)))
+    return Chain(*table, np.array([friction]), np.zeros(1), np.array([[bend]]), np.ones((1, 1)))
 
 
 def _pad(torque, travel, longest):

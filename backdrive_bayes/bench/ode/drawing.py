@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform
 from backdrive_bayes.bench.ode.reducer import OdeReducer
 
 ARCMIN = np.pi / 10800.0
@@ -40,16 +41,6 @@ KINDS = {
     "worm": Kind((1, 30), (0.02, 0.3), (0.02, 0.15), (0.01, 0.1), (0.2, 0.6), (1, 1.4), (0, 0.4), (0.01, 0.1), (8, 80)),
 }
 """Kind -> ranges."""
-
-
-def log_uniform(rng, low: float, high: float) -> float:
-    """A draw whose logarithm is uniform."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def sign(rng) -> float:
-    """-1 or 1."""
-    return float(rng.choice([-1.0, 1.0]))
 
 
 def draw_reducer(rng, kind: str | None = None, without: tuple[str, ...] = ()) -> OdeReducer:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from backdrive_bayes.bench.ode.contact import Mesh
 
-NODES = 3
+IN_PROPORTION = ("angle_rad", "drag", "engagement", "friction", "load_friction", "presliding", "bristle_ratio")
+IN_SHARES = ("clearance_share", "mesh_share", "gap_split", "first_load_share", "bristle_share", "bristle_power")
+HARDENING = ("contact_power", "flank_spread")
 
 
 @dataclass(frozen=True)
@@ -54,13 +56,23 @@ class OdeReducer:
         )
 
     def levels(self):
-        """Constant friction of the nodes and its ratio to the torque passed on, two arrays of shape (NODES,)."""
+        """Constant friction of the nodes and its ratio to the torque passed on, two arrays of shape (nodes,)."""
         rest = 0.5 * (1.0 - self.first_load_share)
         return np.array([self.drag, 0.0, self.friction]), self.load_friction * np.array([self.first_load_share, rest, rest])
 
     def carried(self):
-        """Torque in each mesh when T_r loads the output and all bristles are bent, shape (NODES,)."""
+        """Torque in each mesh when T_r loads the output and all bristles are bent, shape (nodes,)."""
         constant, ratio = self.levels()
         first = (1.0 - constant[0]) / (1.0 + ratio[0])
         second = (first - constant[1]) / (1.0 + ratio[1])
         return np.array([first, second, (second - constant[2]) / (1.0 + ratio[2])])
+
+    def turned(self, held: tuple[str, ...] = ()) -> tuple[OdeReducer, ...]:
+        """The reducer with each parameter in turn moved by a small step, except those of the ``held`` members."""
+        names = [n for n in IN_PROPORTION if not (n == "load_friction" and "load_dependent_friction" in held)]
+        moved = [replace(self, **{n: 1.02 * getattr(self, n)}) for n in names if getattr(self, n) > 0.0]
+        shares = (*IN_SHARES, *(() if "hardening_stiffness" in held else HARDENING))
+        return (*moved, *(replace(self, **{n: getattr(self, n) + self._step(n)}) for n in shares))
+
+    def _step(self, name):
+        return -0.02 if name != "contact_power" and getattr(self, name) > 0.5 else 0.02

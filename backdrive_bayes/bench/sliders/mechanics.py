@@ -7,38 +7,27 @@ depend on the other times.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from backdrive_bayes.bench.plan import event_grid
 from backdrive_bayes.bench.protocol import Circumstances, DrawEffect
 from backdrive_bayes.bench.sliders.effect import Run
-from backdrive_bayes.bench.sliders.reducer import IN_PROPORTION, IN_SHARES, KINDS, BenchReducer, draw_reducer
+from backdrive_bayes.bench.sliders.reducer import KINDS, BenchReducer, draw_reducer
 from backdrive_bayes.bench.sliders.registry import EFFECTS, UNLISTED
 
 STEPS_PER_LEG = 300
-STEP, STEP_OF_SHARE = 0.02, 0.01
-"""How far a parameter is turned: a factor, or a difference of shares."""
-_HELD = {"load_dependent_friction": "load_friction", "hardening_stiffness": "stiffening"}
 
 
 @dataclass(frozen=True)
 class Sliders:
-    """Sliders, gaps and springs in series."""
+    """Implements :class:`backdrive_bayes.bench.protocol.Mechanics`: sliders, gaps and springs in series."""
 
     name: str = "sliders"
     kinds: tuple[str, ...] = KINDS
-
-    @property
-    def effects(self) -> Mapping[str, DrawEffect]:
-        """Listed effects."""
-        return EFFECTS
-
-    @property
-    def unlisted(self) -> Mapping[str, DrawEffect]:
-        """Effects that no library lists."""
-        return UNLISTED
+    effects: Mapping[str, DrawEffect] = field(default_factory=lambda: EFFECTS)
+    unlisted: Mapping[str, DrawEffect] = field(default_factory=lambda: UNLISTED)
 
     def draw_reducer(self, rng, kind: str | None = None, without: tuple[str, ...] = ()) -> BenchReducer:
         """A clean reducer at random."""
@@ -55,13 +44,6 @@ class Sliders:
         for effect in effects:
             reading = effect.read(run, reading)
         return reading[np.searchsorted(times, time_s)]
-
-    def turned(self, reducer: BenchReducer, held: tuple[str, ...] = ()) -> tuple[BenchReducer, ...]:
-        """The reducer with each parameter in turn moved a little."""
-        fixed = {_HELD[name] for name in held if name in _HELD}
-        moved = {name: getattr(reducer, name) * (1.0 + STEP) for name in IN_PROPORTION}
-        moved |= {name: getattr(reducer, name) + STEP_OF_SHARE for name in IN_SHARES}
-        return tuple(replace(reducer, **{name: value}) for name, value in moved.items() if name not in fixed)
 
 
 MECHANICS = Sliders()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtri
@@ -16,7 +16,8 @@ STOPS = 24
 KINDS = ("geometric", "elastic", "intermediate")
 IN_PROPORTION = ("clearance_share", "drag", "engagement", "compliance_share", "knee", "friction", "load_friction", "spread")
 IN_SHARES = ("springback_share", "release", "stiffening", "free_share")
-"""Parameters a fit may turn to make an effect look smaller: by a factor, or by a difference of shares."""
+"""Parameters a fit may turn to make an effect look smaller: by a factor of 1.02, or by 0.01 of a share."""
+_HELD = {"load_dependent_friction": "load_friction", "hardening_stiffness": "stiffening"}
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,13 @@ class BenchReducer:
         felt = elements.stops(torque_nm, stop, np.full(STOPS, 1.0 / STOPS))
         load = (1.0 - self.stiffening) * torque_nm + self.stiffening * felt
         return self.compliance_share * self.angle_rad * load / self.rated_torque_nm
+
+    def turned(self, held: tuple[str, ...] = ()) -> tuple[BenchReducer, ...]:
+        """The reducer with each parameter in turn moved a little."""
+        fixed = {_HELD[name] for name in held if name in _HELD}
+        moved = {name: getattr(self, name) * 1.02 for name in IN_PROPORTION}
+        moved |= {name: getattr(self, name) + 0.01 for name in IN_SHARES}
+        return tuple(replace(self, **{name: value}) for name, value in moved.items() if name not in fixed)
 
 
 def slider_levels(spread: float):

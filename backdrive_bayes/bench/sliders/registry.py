@@ -1,42 +1,27 @@
-"""The effects this bench can give a reducer: a new one is a file and a line here."""
+"""The effects this bench can give a reducer: a new one is a class and a line here."""
 
 from __future__ import annotations
 
-from backdrive_bayes.bench.protocol import DrawEffect
-from backdrive_bayes.bench.sliders.effects import (
-    asymmetric_stiffness,
-    encoder_error,
-    hardening_stiffness,
-    interface_slip,
-    load_dependent_friction,
-    rate_dependent_friction,
-    second_backlash,
-    sensor_lag,
-    stick_slip,
-    thermal_drift,
-    torque_offset,
-    viscoelastic_creep,
-)
+from backdrive_bayes.bench.sliders.effects import channel, compliance, friction, series
 from backdrive_bayes.bench.sliders.unlisted import angle_channel, reducer_faults, torque_channel
 
-EFFECTS: dict[str, DrawEffect] = {
-    "interface_slip": interface_slip.draw,
-    "viscoelastic_creep": viscoelastic_creep.draw,
-    "asymmetric_stiffness": asymmetric_stiffness.draw,
-    "second_backlash": second_backlash.draw,
-    "sensor_lag": sensor_lag.draw,
-    "thermal_drift": thermal_drift.draw,
-    "torque_offset": torque_offset.draw,
-    "encoder_error": encoder_error.draw,
-    "stick_slip": stick_slip.draw,
-    "rate_dependent_friction": rate_dependent_friction.draw,
-    "load_dependent_friction": load_dependent_friction.draw,
-    "hardening_stiffness": hardening_stiffness.draw,
+EFFECTS = {
+    "interface_slip": series.draw_interface_slip,
+    "viscoelastic_creep": compliance.draw_viscoelastic_creep,
+    "asymmetric_stiffness": compliance.draw_asymmetric_stiffness,
+    "second_backlash": series.draw_second_backlash,
+    "sensor_lag": channel.draw_sensor_lag,
+    "thermal_drift": channel.draw_thermal_drift,
+    "torque_offset": channel.draw_torque_offset,
+    "encoder_error": channel.draw_encoder_error,
+    "stick_slip": friction.draw_stick_slip,
+    "rate_dependent_friction": friction.draw_rate_dependent_friction,
+    "load_dependent_friction": friction.draw_load_dependent_friction,
+    "hardening_stiffness": compliance.draw_hardening_stiffness,
 }
 """Name in the contract -> draw(rng, reducer) of an effect with strength 0."""
 
-
-UNLISTED: dict[str, DrawEffect] = {
+UNLISTED = {
     "mains_hum": angle_channel.draw_hum,
     "sensor_jump": angle_channel.draw_jump,
     "angle_scale": angle_channel.draw_scale,

@@ -117,13 +117,13 @@ def test_drawn_reducers_stay_in_their_ranges(seed):
 def test_members_can_be_left_out():
     reducer = MECHANICS.draw_reducer(np.random.default_rng(4), None, WITHOUT)
     assert reducer.flank_friction == 0.0 and reducer.exponent == 1.0 and reducer.gap_scatter == 0.0
-    assert len(MECHANICS.turned(reducer, WITHOUT)) == len(MECHANICS.turned(reducer)) - 1
+    assert len(reducer.turned(WITHOUT)) == len(reducer.turned()) - 1
 
 
 def test_each_turned_parameter_moves_the_angle_a_little():
     reducer = drawn(0)
     plain = angle(reducer, record(reducer))
-    moved = [np.std(angle(other, record(reducer)) - plain) for other in MECHANICS.turned(reducer)]
+    moved = [np.std(angle(other, record(reducer)) - plain) for other in reducer.turned()]
     assert len(moved) >= 12 and min(moved) > 1e-7 and max(moved) < 0.05
 
 

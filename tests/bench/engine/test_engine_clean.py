@@ -111,8 +111,8 @@ def test_draws_reproduce_themselves_and_leave_out_members():
 @each_reducer
 def test_every_turned_parameter_moves_the_angle(reducer):
     _, angle = curve(reducer, record(reducer))
-    for turned in MECHANICS.turned(reducer):
+    for turned in reducer.turned():
         _, moved = curve(turned, record(turned))
         change = moved * turned.angle_rad / reducer.angle_rad - angle
         assert 1e-6 < np.abs(change).max() < 0.4
-    assert len(MECHANICS.turned(reducer, ("load_dependent_friction",))) == len(MECHANICS.turned(reducer)) - 1
+    assert len(reducer.turned(("load_dependent_friction",))) == len(reducer.turned()) - 1

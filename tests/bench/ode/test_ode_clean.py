@@ -7,7 +7,6 @@ import pytest
 
 from backdrive_bayes.bench.ode import MECHANICS
 from backdrive_bayes.bench.ode.contact import Mesh, compliance_table
-from backdrive_bayes.bench.ode.record import record_angle
 from backdrive_bayes.bench.plan import Loop, Path, make_path
 from backdrive_bayes.bench.protocol import Circumstances
 
@@ -71,7 +70,7 @@ def test_the_rate_does_not_matter(reducer):
 def test_finer_steps_change_little(reducer):
     where = circumstances(reducer)
     time = np.linspace(0.0, where.path.end_s, 1500)
-    coarse, fine = record_angle(reducer, (), where, time), record_angle(reducer, (), where, time, tolerance=5e-8)
+    coarse, fine = (m.angle(reducer, (), where, time) for m in (MECHANICS, replace(MECHANICS, tolerance=5e-8)))
     assert np.abs(coarse - fine).max() < 5e-5 * reducer.angle_rad
 
 
@@ -108,7 +107,7 @@ def test_members_can_be_left_out(member):
     else:
         torque, travel = compliance_table(reducer.meshes()[2])
         assert np.ptp(np.diff(travel) / np.diff(torque)) < 1e-9
-    assert len(MECHANICS.turned(reducer, (member,))) < len(MECHANICS.turned(DRAWN[3]))
+    assert len(reducer.turned((member,))) < len(DRAWN[3].turned())
 
 
 def test_turned_reducers_move_a_little():
@@ -116,7 +115,7 @@ def test_turned_reducers_move_a_little():
     where = circumstances(reducer)
     time = np.linspace(0.0, where.path.end_s, 400)
     plain = clean(reducer, where, time)
-    for other in MECHANICS.turned(reducer):
+    for other in reducer.turned():
         moved = np.std(MECHANICS.angle(other, (), where, time) / reducer.angle_rad - plain)
         assert 1e-7 < moved < 0.1
 

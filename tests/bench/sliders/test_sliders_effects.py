@@ -201,6 +201,6 @@ def test_turned_reducers_are_physical_and_each_is_another():
     reducer = draw_reducer(np.random.default_rng(1), "intermediate")
     at = setting(reducer=reducer)
     plain = record_angle(reducer, (), at)
-    changes = [record_angle(other, (), at) - plain for other in MECHANICS.turned(reducer)]
+    changes = [record_angle(other, (), at) - plain for other in reducer.turned()]
     assert all(0 < np.abs(change).max() < 0.1 * reducer.angle_rad for change in changes)
-    assert len(MECHANICS.turned(reducer, ("hardening_stiffness",))) == len(changes) - 1
+    assert len(reducer.turned(("hardening_stiffness",))) == len(changes) - 1

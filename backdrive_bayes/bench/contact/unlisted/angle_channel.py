@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.contact.effect import ContactEffect, loaded_angle, sign
+from backdrive_bayes.bench.contact.effect import ContactEffect, loaded_angle
+from backdrive_bayes.bench.draws import sign
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.contact.drawing import log_uniform
-from backdrive_bayes.bench.contact.effect import ContactEffect, loaded_angle, sign
+from backdrive_bayes.bench.contact.effect import ContactEffect, loaded_angle
+from backdrive_bayes.bench.draws import log_uniform, sign
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.contact.drawing import log_uniform
-from backdrive_bayes.bench.contact.effect import NO_TIMES, ContactEffect, sign
+from backdrive_bayes.bench.contact.effect import ContactEffect
 from backdrive_bayes.bench.contact.patches import joint_turn
+from backdrive_bayes.bench.draws import log_uniform, sign
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class UnseenRipple(ContactEffect):
     def times_s(self, test):
         """Sixteen a period."""
         if not self.strength:
-            return NO_TIMES
+            return np.zeros(0)
         path = test.where.path
         return np.arange(path.time_s[0], path.end_s, 1.0 / (16.0 * self.frequency_hz))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.bench.ode.drawing import log_uniform, sign
+from backdrive_bayes.bench.draws import log_uniform, sign
 from backdrive_bayes.bench.ode.effect import OdeEffect
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform, sign
 from backdrive_bayes.bench.ode import bristles
-from backdrive_bayes.bench.ode.drawing import log_uniform
 from backdrive_bayes.bench.ode.effect import OdeEffect
 
 LAWS = {"logarithm": bristles.LOGARITHM, "power": bristles.POWER, "saturating": bristles.SATURATING}
@@ -66,6 +66,6 @@ def draw_rate(rng, reducer):
     """Three laws, both signs."""
     law = str(rng.choice(list(LAWS)))
     reference = {"logarithm": (0.02, 0.1), "power": (0.3, 1.0), "saturating": (0.2, 0.8)}[law]
-    direction = float(rng.choice([-1.0, 1.0]))
+    direction = sign(rng)
     power = rng.uniform(0.3, 0.6) if law == "power" else rng.uniform(0.7, 1.3)
     return RateDependentFriction(0.0, law, direction, log_uniform(rng, *reference), log_uniform(rng, 0.05, 0.3), power)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform
 from backdrive_bayes.bench.ode.chain import coupling
 from backdrive_bayes.bench.ode.contact import Mesh, compliance_table
-from backdrive_bayes.bench.ode.drawing import log_uniform
 from backdrive_bayes.bench.ode.effect import OdeEffect
 from backdrive_bayes.bench.ode.integrate import follow
 

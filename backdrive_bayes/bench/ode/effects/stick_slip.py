@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from backdrive_bayes.bench.ode.drawing import log_uniform
+from backdrive_bayes.bench.draws import log_uniform
 from backdrive_bayes.bench.ode.effect import OdeEffect
 
 STEP = 0.04

@@ -1,1 +1,1 @@
-"""The effects that a diagnosis knows by name, one file each."""
+"""The effects that a diagnosis knows by name."""

@@ -1,4 +1,4 @@
-"""Micro-slip of the output clamp: above a threshold of torque, while it grows, and kept until the torque reverses."""
+"""Parts in series on the output side: a second clearance, and a clamp that slips."""
 
 from __future__ import annotations
 
@@ -6,10 +6,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.bench.draws import log_uniform
 from backdrive_bayes.bench.sliders import elements
 from backdrive_bayes.bench.sliders.effect import Effect
 
-LAWS = ("linear", "accelerating", "saturating")
+
+@dataclass(frozen=True)
+class SecondBacklash(Effect):
+    """Parts that float with ``drag`` and engage within ``engagement`` (shares of rated torque); strength is angle share."""
+
+    drag: float
+    engagement: float
+    uneven: float
+
+    def deflect(self, run, torque_nm, transmitted_nm, angle_rad):
+        """Angle from the second clearance [rad]."""
+        rated, place = run.reducer.rated_torque_nm, np.linspace(-1.0, 1.0, 9)
+        drag = np.full((torque_nm.size, place.size), rated * self.drag) * (1.0 + self.uneven * place)
+        width = np.full(place.size, rated * self.engagement / 3)
+        moved = elements.gaps(torque_nm, drag, rated * self.engagement * place, width, width)
+        return 0.5 * self.strength * run.reducer.angle_rad * moved.mean(axis=1)
+
+
+def draw_second_backlash(rng, reducer):
+    """A second step well apart from the first, where settled loops still cross it."""
+    drag = rng.uniform(max(0.12, 3 * reducer.drag), 0.5)
+    return SecondBacklash(0.0, drag, log_uniform(rng, 0.01, 0.06), rng.uniform(0.0, 0.15))
 
 
 @dataclass(frozen=True)
@@ -48,7 +70,7 @@ class InterfaceSlip(Effect):
         return self.strength * run.reducer.angle_rad * slip
 
 
-def draw(rng, reducer):
+def draw_interface_slip(rng, reducer):
     """Thresholds from half to nine tenths of the rated torque."""
-    law, back = str(rng.choice(LAWS)), bool(rng.integers(2))
+    law, back = str(rng.choice(["linear", "accelerating", "saturating"])), bool(rng.integers(2))
     return InterfaceSlip(0.0, rng.uniform(0.5, 0.85), rng.uniform(0.01, 0.06), law, back)
