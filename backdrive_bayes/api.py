@@ -189,11 +189,16 @@ def fit(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, loads=(), load
     return _fitted(ready, *fit_unit(ready.unit, options, progress or (lambda text: None)))
 
 
-def diagnose(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, force=False, progress=None) -> Diagnosis:
-    """Where model and measurement part, which effect causes it, and the fit of the model with it, as for :func:`fit`."""
+def diagnose(unit, *, simulated=None, k=0.03, level=0.9, seed: int = 0, baseline=None, force=False, progress=None) -> Diagnosis:
+    """Where model and measurement part, which effect causes it, and the fit of the model with it, as for :func:`fit`.
+
+    ``simulated`` is a unit (or the path of one) of what a simulator answered to the same or other torque paths; the diagnosis
+    then says what the simulator lacks, and ``result["simulator"]`` what re-tuning it would close.
+    """
     modules = FitOptions.baseline if baseline is None else tuple(baseline)
     options, ready = FitOptions(modules, k, level, seed), _ready(unit, k, force)
-    result, sampled = diagnose_unit(ready.unit, options, progress or (lambda text: None))
+    other = None if simulated is None else _ready(simulated, k, force).unit
+    result, sampled = diagnose_unit(ready.unit, options, progress or (lambda text: None), simulated=other)
     return Diagnosis(ready.stamp(result), _fitted(ready, *sampled))
 
 

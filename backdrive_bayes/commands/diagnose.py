@@ -18,8 +18,8 @@ from backdrive_bayes.commands.results import (
     refuse_company,
     retire,
 )
-from backdrive_bayes.commands.stages import DIAGNOSE
-from backdrive_bayes.commands.tables import show_indicators, show_which
+from backdrive_bayes.commands.stages import DIAGNOSE, DIAGNOSE_SIMULATED
+from backdrive_bayes.commands.tables import show_indicators, show_simulator, show_which
 from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.number_text import probability_text
 
@@ -29,6 +29,8 @@ HELP = "find the unmodelled effect behind the gap between model and measurement"
 def add_arguments(parser) -> None:
     """Options of this verb."""
     parser.add_argument("unit", type=Path, metavar="UNIT", help="unit folder or a bare record file")
+    what = "what a simulator answered to the same or other torque paths: say what it lacks, and what re-tuning it would close"
+    parser.add_argument("--simulated", type=Path, metavar="SIM_UNIT", help=what)
     add_fit_arguments(parser)
     parser.add_argument("--no-posterior", action="store_true", help="write diagnosis.json only, sample nothing")
 
@@ -38,10 +40,11 @@ def run(args) -> int:
     began, options = time.perf_counter(), FitOptions.of(args)
     ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
     unit = ready.unit
+    simulated = ready_unit(args.simulated, options.k, getattr(args, "force", False)).unit if args.simulated else None
     out = args.out or default_out(unit.name, "diagnose")
     require_out(out)
-    with progress(*DIAGNOSE) as note:
-        result, sampled = diagnose_unit(unit, options, note, not args.no_posterior)
+    with progress(*(DIAGNOSE_SIMULATED if simulated else DIAGNOSE)) as note:
+        result, sampled = diagnose_unit(unit, options, note, not args.no_posterior, simulated)
     ready.stamp(result)
     if sampled is None:
         refuse_company(out, result)
@@ -62,11 +65,16 @@ def run(args) -> int:
 
 def _summarise(result: dict, sampled, out: Path) -> None:
     say(f"{result['unit']}: {line(result['outcome'])}")
+    simulator = result.get("simulator")
     if not result["inconclusive"]:
+        lead, nothing = ("missing in the simulator", "nothing that is listed") if simulator else ("answer", "no gap")
         say(f"a gap is there with probability {probability_text(result['gap']['probability'])}: {result['where']['summary']}")
-        say(f"answer: {' + '.join(result['answer']['effects']).replace('_', ' ') or 'no gap'}")
+        say(f"{lead}: {' + '.join(result['answer']['effects']).replace('_', ' ') or nothing}")
         show_which(result)
         say(f"something that is not listed acts with probability {probability_text(result['gap']['unlisted_probability'])}")
+    if simulator:
+        show_simulator(simulator, result["level"])
+    elif not result["inconclusive"]:
         closed = result["shrink"]["closed_fraction"]
         say(f"closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")
     if sampled is not None:

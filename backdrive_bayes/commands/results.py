@@ -124,16 +124,27 @@ def stamped_by(result: dict, evidences, seed: int | None = None, **options) -> d
     return stamped(result, rests, about["seed"] if seed is None else seed, own | options)
 
 
-def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: bool = True):
-    """The diagnosis object of a unit, and posterior and indicators object of the model it chose (None where not asked for)."""
-    from backdrive_bayes.gap.diagnose import diagnose
+def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: bool = True, simulated=None):
+    """The diagnosis object of a unit, and posterior and indicators object of the model it chose (None where not asked for).
 
-    found = diagnose(unit, baseline=options.baseline, seed=options.seed, k=options.k, progress=note)
+    ``simulated`` is the unit of a simulator's answers, of which the diagnosis then says what it lacks.
+    """
+    from backdrive_bayes.gap.diagnose import diagnose
+    from backdrive_bayes.gap.simulated import diagnose_simulated
+
+    shared: dict = {"seed": options.seed, "k": options.k, "progress": note}
+    if simulated is None:
+        found = diagnose(unit, baseline=options.baseline, **shared)
+    elif set(options.baseline) == set(FitOptions.baseline):
+        found = diagnose_simulated(unit, simulated, **shared)
+    else:
+        raise BadInput("--baseline", f"{BASELINE} beside --simulated", ",".join(options.baseline))
+    about = options.to_json() | ({"simulated": simulated.name} if simulated else {})
     if not sample:
-        return stamped(found.json, origin(unit), options.seed, options.to_json()), None
+        return stamped(found.json, origin(unit), options.seed, about), None
     sampled = fit_unit(unit, options, note, found.posterior)
     found.json["convergence"] = sampled[1]["convergence"]
-    return stamped(found.json, origin(unit), options.seed, options.to_json()), sampled
+    return stamped(found.json, origin(unit), options.seed, about), sampled
 
 
 def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=lambda text: None) -> None:

@@ -29,6 +29,11 @@ FIT = (*_PREPARED, _WEIGHED, _SAMPLED, _TOLD)
 FIT_KEPT = (*FIT, *_KEPT)
 _LOCATED = (*_PREPARED, _WEIGHED, Stage("where it lies", 2.0))
 DIAGNOSE = (*_LOCATED, Stage("sampling the chosen model", 4.0), _SAMPLED, _TOLD, *_KEPT)
+_SIMULATOR = (
+    Stage("simulator: reducing", 0.5), Stage("simulator: finding", 5.0), Stage("simulator: sampling", 10.0),
+    Stage("splitting the gap", 3.0),
+)  # fmt: skip
+DIAGNOSE_SIMULATED = (*_LOCATED, Stage("sampling the chosen model", 4.0), _SAMPLED, *_SIMULATOR, _TOLD, *_KEPT)
 ACCEPT = (*FIT, *_LOCATED)
 
 

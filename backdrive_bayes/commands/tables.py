@@ -7,7 +7,7 @@ import re
 
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.screen import Column, show_table, width
-from backdrive_bayes.number_text import interval_text, level_text, probability_text
+from backdrive_bayes.number_text import interval_text, level_text, like_interval, probability_text
 from backdrive_bayes.results import usable
 
 ARCMIN_PER_RAD = 10800.0 / math.pi
@@ -24,6 +24,12 @@ _SYMBOLS = {
     "dissipation_ratio": "u",
 }
 _SHOWN = ("lost_motion_rad", "zero_torque_width_rad", "loop_area_J", "dissipation_ratio")
+SPLIT = {
+    "closed_by_retuning": "closed by re-tuning",
+    "closed_by_effect": "closed by what is missing",
+    "left": "left",
+}
+"""Parts of the gap between a simulator and a unit."""
 _SUFFIX = re.compile(r"\.(csv|xlsx|parquet|tdms|mat|mf4)(\.[gx]z)?$")
 _AT = "rate [N·m/s],\namplitude [N·m]"
 _CONTRASTS = {"greater": ">", "less": "<", "equivalent": "≈", "undecided": "?", "inconclusive": "–"}
@@ -108,6 +114,25 @@ def show_which(result: dict) -> None:
         if row["probability"] >= LEAST_SHOWN
     ]
     show_table([Column("effect", False, 24), Column("probability"), Column("", False)], rows)
+
+
+def show_simulator(found: dict, level: float) -> None:
+    """The split of the gap between a simulator and the unit, and the parameters from the one to the other."""
+    say(f"simulator {found['unit']}: {found['summary']}")
+    if found["told"]:
+        closed = ((words, found[key]) for key, words in SPLIT.items())
+        rows = [[words, *(f"{share[end]:.0%}" for end in ("median", "lo", "hi"))] for words, share in closed]
+        show_table([Column("share of the gap, on data left out", False, 24), *map(Column, ("share", "from", "to"))], rows)
+    rows = []
+    for row in found["parameters"]:
+        size = max(abs(row["simulated"]), *(abs(row["measured"][end]) for end in ("lo", "hi")))
+        unit, factor = ("′", ARCMIN_PER_RAD) if row["unit"] == "rad" else _in_prefix(row["unit"], size)
+        own = like_interval(row["simulated"], row["simulated_interval"], factor)
+        moved = "changed" if row["credible"] else ""
+        rows.append([f"{row['name'].rpartition('_')[0] or row['name']} {f'[{unit}]' if unit else ''}", own,
+                     _cell(row["measured"], factor), moved])  # fmt: skip
+    columns = [Column("parameter", False, 20), Column("simulator"), Column("unit"), Column("", False)]
+    show_table(columns, rows, f"Median, of the unit with its {level_text(level)} interval")
 
 
 def _record(record: dict) -> str:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from msgspec import Struct, field
 
-from backdrive_bayes.schemas.result_parts import Branch, Convergence, Count, Curve, Interval, Number, Probability, Result
+from backdrive_bayes.schemas.result_parts import Branch, Convergence, Count, Curve, Digest, Interval, Number, Probability, Result
 from backdrive_bayes.schemas.words import Text
 
 
@@ -67,6 +67,7 @@ class HeldOut(Struct):
     before_rad: Number
     after_rad: Number
     noise_floor_rad: Number
+    retuned_rad: Number = None
     closed_fraction: Interval | None = None
 
 
@@ -86,6 +87,7 @@ class Shrink(Struct):
     noise_floor_rad: Number
     closed_fraction: Interval
     indicators: dict[str, BeforeAfter]
+    retuned_rad: Number = None
     records: list[HeldOut] = field(default_factory=list)
     gaussian_process: dict[str, Any] = field(default_factory=dict)
     indicators_at: dict[str, Any] | None = None
@@ -118,7 +120,61 @@ class Residual(Struct):
     direction: Curve
     before_rad: Curve
     after_rad: Curve
+    retuned_rad: Curve = field(default_factory=list)
     noise_rad: Number = None
+
+
+class GapPart(Where, kw_only=True):
+    """Where a part of the gap lies."""
+
+    part: Literal["retuning", "effect", "left"]
+
+
+class GapShares(Struct):
+    """Shares of the gap on one held-out record or leg."""
+
+    record: Text
+    retuning: Interval
+    effect: Interval
+    left: Interval
+
+
+class SimulatedParameter(Struct):
+    """A parameter of the reducer in the simulator and in the unit; ``credible`` where the change's interval excludes zero."""
+
+    name: Text
+    unit: str
+    simulated: Number
+    measured: Interval
+    simulated_interval: Interval | None = None
+    change: Interval | None = None
+    credible: bool = False
+
+
+class Simulator(Struct):
+    """The gap between a simulator and the unit, split: closed by re-tuning, by what is missing, left.
+
+    ``told`` says whether the gap stands out of the noise; shares are null where it does not. ``effects`` are those that the
+    simulator has itself, ``same_path`` says of which records its own angle was taken, ``noise_added`` how it was read.
+    """
+
+    closed_by_retuning: Interval
+    closed_by_effect: Interval
+    left: Interval
+    parameters: list[SimulatedParameter]
+    unit: str = ""
+    told: bool = True
+    summary: str = ""
+    closed_by_both: Interval | None = None
+    effects: list[str] = field(default_factory=list)
+    shared_effects: list[str] = field(default_factory=list)
+    same_path: list[bool] = field(default_factory=list)
+    noise_added: dict[str, Number] = field(default_factory=dict)
+    rms_rad: dict[str, Number] = field(default_factory=dict)
+    parts: list[GapPart] = field(default_factory=list)
+    records: list[GapShares] = field(default_factory=list)
+    data_sha256: list[Digest] = field(default_factory=list)
+    convergence: Convergence | None = None
 
 
 class DiagnosisFile(Result, kw_only=True):
@@ -139,4 +195,5 @@ class DiagnosisFile(Result, kw_only=True):
     records: list[dict[str, Any]] = field(default_factory=list)
     residual: list[Residual] = field(default_factory=list)
     parameter_shift: list[ParameterShift] = field(default_factory=list)
+    simulator: Simulator | None = None
     convergence: Convergence | None = None
