@@ -24,7 +24,7 @@ HEAD = """# Kills
 Every verb is started and killed at a random moment of the time that it needs undisturbed, again and again into one folder, and at
 last left alone. A round fails where a signal leaves a result file that is not whole, where Ctrl-C or SIGTERM say more than one
 line or end with another code than 130 and 143, where the last run does not end with the code and the bytes of the undisturbed
-one (run.json apart), or where a `.part` file is left. "Late" are signals that came after the end;
+one (run.json apart), or where a `.part` file is left. "Late" are signals that came after the end, beside the others;
 what Python itself says to a signal before the package's first line runs is not counted.
 
 """
@@ -86,16 +86,18 @@ def _round(verb: Verb, room: Path, kills: int, rng) -> dict:
     verb.files = _files(still)
     row = {"verb": verb.name, "seconds": verb.seconds, "late": 0, "faults": []} | dict.fromkeys(SIGNALS, 0)
     out = room / f"{verb.name}-killed"
-    for count in range(kills):
-        number = list(SIGNALS)[count % len(SIGNALS)]
+    for _ in range(3 * kills):
+        sent = sum(row[number] for number in SIGNALS)
+        if sent == kills:
+            break
+        number = list(SIGNALS)[sent % len(SIGNALS)]
         process = _start(verb, out, room)
         time.sleep(float(rng.uniform(0.0, verb.seconds)))
         late = process.poll() is not None
         if not late:
             process.send_signal(number)
         said, code = process.communicate()[1], process.returncode
-        row[number] += 1
-        row["late"] += late or code == verb.code
+        row["late" if late or code == verb.code else number] += 1
         row["faults"] += _faults(verb, number, code, said, out, late)
     code = _start(verb, out, room).wait()
     found = _files(out)
