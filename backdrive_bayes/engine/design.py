@@ -9,12 +9,24 @@ import numpy as np
 
 from backdrive_bayes.engine.marginal import Scales
 from backdrive_bayes.engine.reduced import Reduced
-from backdrive_bayes.mechanics.effect import Distortion, Effect, FlankEffect, PathEffect, SpreadEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import (
+    Distortion,
+    Effect,
+    FlankEffect,
+    GrowthEffect,
+    PathEffect,
+    SpreadEffect,
+    TangentEffect,
+)
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.history import History, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
 INITIAL_LOG_SCALE = (float(np.log(0.02)), 1.5)
+STEP = 2e-5
+"""Step of the difference quotients by offset and lag."""
+LEAST_LAW = 0.05
+"""Range of a term of the rate's law, over the records, below which nothing is known of it."""
 FLOATING_LOG_SCALE = (float(np.log(0.8)), 0.0)
 """A floating clearance lies anywhere between its flanks."""
 
@@ -89,9 +101,9 @@ def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion
     """Columns of the class at a distortion."""
     found: dict[str, list] = {}
     for r, history in enumerate(histories(reduced, distortion)):
-        log_rate = reduced.context.log_rate[r]
-        columns = reducer.columns(history, distortion.exponents, log_rate)
-        columns |= reducer.initial_columns(history, clearance_weights, distortion.exponents, log_rate)
+        growth = distortion.growth(reduced.context.log_rate[r], reduced.context)
+        columns = reducer.columns(history, growth)
+        columns |= reducer.initial_columns(history, clearance_weights, growth)
         for name, column in columns.items():
             found.setdefault(name, []).append(column)
     return Design(tuple(Group(n, tuple(c), n in ("initial", "floating")) for n, c in found.items()))
@@ -113,11 +125,11 @@ def path_group(reduced: Reduced, effect: PathEffect) -> Group:
 def tangent_groups(reduced, reducer, design: Design, distortion, weights, effects: tuple[Effect, ...]) -> tuple[Group, ...]:
     """Columns made of the class's prediction with ``weights``: derivatives by the parameter of every tangent effect that can be
     told, and even counterparts."""
-    base, groups = design.predict(weights), []
+    base, groups, grown = design.predict(weights), [], None
     for effect in effects:
         if isinstance(effect, FlankEffect):
             rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
-            columns = (reducer.flank_columns(h, weights, distortion.exponents, rate) for h, rate in rates)
+            columns = (reducer.flank_columns(h, weights, distortion.growth(rate, reduced.context)) for h, rate in rates)
             groups.append(Group(effect.name, tuple(columns)))
         if isinstance(effect, SpreadEffect):
             groups.append(Group(effect.name, _spread(reduced, reducer, distortion, weights, base)))
@@ -125,12 +137,21 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
             late = next(g for g in groups if g.name == "sensor_lag")
             # A lag moves the torque by rate times lag, friction of the bench by the same amount at every rate.
             groups.append(Group(effect.name, tuple(c / rate for c, rate in zip(late.columns, reduced.context.rate, strict=True))))
-        if not isinstance(effect, TangentEffect) or not told(reduced, effect):
-            continue
-        moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + effect.step})
-        there = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
-        groups.append(Group(effect.name, tuple(((a - b) / effect.step)[:, None] for a, b in zip(there, base, strict=True))))
+        if isinstance(effect, GrowthEffect):
+            terms = [reduced.context.law(x)[effect.term] for x in reduced.context.log_rate]
+            if np.ptp(terms) > LEAST_LAW:
+                grown = grown or _grown(reduced, reducer, distortion, weights)
+                groups.append(Group(effect.name, tuple(g[:, [effect.part]] * t for g, t in zip(grown, terms, strict=True))))
+        elif isinstance(effect, TangentEffect):
+            moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + STEP})
+            there = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
+            groups.append(Group(effect.name, tuple(((a - b) / STEP)[:, None] for a, b in zip(there, base, strict=True))))
     return tuple(groups)
+
+
+def _grown(reduced, reducer, distortion, weights):
+    rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
+    return [reducer.grown(history, weights, distortion.growth(rate, reduced.context)) for history, rate in rates]
 
 
 DELAYS, SHARES = np.polynomial.laguerre.laggauss(3)
@@ -147,8 +168,3 @@ def _spread(reduced, reducer, distortion, weights, base):
         late = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
         found = [f + share * a for f, a in zip(found, late, strict=True)]
     return tuple(f[:, None] for f in found)
-
-
-def told(reduced: Reduced, effect: TangentEffect) -> bool:
-    """Whether the records differ enough in rate for an exponent of the rate."""
-    return not effect.parameter.endswith("exponent") or np.ptp(reduced.context.log_rate) > 0.05

@@ -32,11 +32,11 @@ def library_terms():
 
 
 @one_thread()
-def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda text: None) -> Linear:
-    """The linear model of a unit about its mode."""
+def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda text: None) -> tuple[Linear, ...]:
+    """The linear models of a unit about its modes, the joint one first."""
     note("reducing the records")
     reduced = reduce_unit(without_wild(unit))
-    note("finding the mode")
+    note("finding the modes")
     return linearise(reduced, library_terms(), modules)
 
 

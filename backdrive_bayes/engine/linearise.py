@@ -3,6 +3,7 @@ model about it."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,11 +18,13 @@ from backdrive_bayes.engine.design import (
     tangent_groups,
 )
 from backdrive_bayes.engine.marginal import Solution, Whitened, find_scales, whiten
+from backdrive_bayes.engine.periodic import PRICE, WAVE, clearest_wave, wave_group
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.reducer import BASELINE, TOP, ReducerClass, place_knots, spaced
+from backdrive_bayes.mechanics.registry import all_effects
 
 KNOTS = 60
 MOST_KNOTS = 140
@@ -38,6 +41,15 @@ STEPS = 14
 TRIAL_STEPS = 2
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque; exponents fifty times as much."""
+BENDING = {
+    "torque_offset": ("offset",),
+    "sensor_lag": ("lag_s",),
+    "rate_dependent_friction": ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend"),
+}
+"""Effects whose columns are derivatives, and the places of their parameters in a distortion."""
+BENT = 1.0
+"""Torque, in its noise, by which a distortion moves the prediction no longer along a straight line."""
+MOST_BENT = 2
 WIDE = 2.0
 """Standard deviation of an effect's log scale while the mode is searched."""
 USUAL_JITTER = Jitter(0.15, 0.002)
@@ -90,14 +102,58 @@ class Linear:
         return np.split(white, np.cumsum([a.size for a in self.angles])[:-1])
 
 
-def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE, extra: tuple[Group, ...] = ()) -> Linear:
-    """The joint model's mode: damped Gauss-Newton steps for the distortion, knots refined where the residual asks for it."""
-    fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)) + extra
-    search = _Search(reduced, effects, modules, fixed)
+def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
+    """The joint model's mode, where every effect may act, and modes where only some of those act that bend the prediction.
+
+    Whatever cannot be followed by a straight line from the joint mode (an offset, a lag, a law of the rate, a wave) has modes
+    of its own: without any of them, with each, and with pairs. A hypothesis is weighed about the mode where it is likeliest.
+    """
+    fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))
     starts = _apart([*possible_starts(reduced), Distortion()], reduced.context)
-    trials = [search.run(start, TRIAL_STEPS) for start in starts]
-    best = max(trials, key=lambda found: found.log_marginal)
-    return search.run(best.distortion, STEPS, refine=True)
+    trials = []
+    for start in starts:
+        trial = _Search(reduced, effects, modules, fixed).run(start, TRIAL_STEPS)
+        trials.append((trial.log_marginal, start, ()))
+        gain, frequency = clearest_wave(trial)
+        if gain > 0:
+            wave = replace(wave_group(trial, frequency), name=WAVE)
+            beside = _Search(reduced, effects, modules, (*fixed, wave)).run(start, TRIAL_STEPS)
+            trials.append((beside.log_marginal - PRICE, start, (wave,)))
+    _, start, waves = max(trials, key=lambda found: found[0])
+    joint = _Search(reduced, effects, modules, (*fixed, *waves)).run(start, STEPS, refine=True)
+    found = [joint]
+    bent = _bent(joint)
+    for count in range(min(len(bent), MOST_BENT) + 1 if bent else 0):
+        for some in itertools.combinations(bent, count):
+            search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
+            found.append(search.run(_only(joint.distortion, some), STEPS, refine=True))
+    return tuple(_without(linear, WAVE) for linear in found)
+
+
+def _bent(joint: Linear) -> tuple[str, ...]:
+    """What is too large at the joint mode to be taken back along a straight line."""
+    context, large = joint.reduced.context, []
+    for name, places in BENDING.items():
+        rest = replace(joint.distortion, **dict.fromkeys(places, 0.0))
+        if _length(joint.distortion, rest, context) > BENT * context.torque_noise:
+            large.append(name)
+    return (*large, WAVE) if WAVE in joint.design.names else tuple(large)
+
+
+def _only(distortion: Distortion, some) -> Distortion:
+    """A distortion by some effects alone."""
+    return replace(distortion, **{p: 0.0 for n, places in BENDING.items() if n not in some for p in places})
+
+
+def _without(linear: Linear, name: str) -> Linear:
+    """The linear model less one group, its solution as it was beside that group."""
+    if name not in linear.design.names:
+        return linear
+    keep = linear.design.index != linear.design.names.index(name)
+    design = Design(tuple(g for g in linear.design.groups if g.name != name))
+    solution = replace(linear.solution, mean=linear.solution.mean[keep], root=linear.solution.root[keep])
+    scales = {n: v for n, v in linear.log_scale.items() if n != name}
+    return replace(linear, design=design, data=linear.whitened(design), log_scale=scales, solution=solution)
 
 
 def learn_jitter(linear: Linear) -> Jitter:
@@ -136,6 +192,7 @@ class _Search:
     effects: tuple[Effect, ...]
     modules: tuple[str, ...]
     fixed: tuple[Group, ...]
+    only: tuple[str, ...] | None = None
 
     def run(self, distortion: Distortion, steps: int, refine: bool = False) -> Linear:
         reduced, context = self.reduced, self.reduced.context
@@ -169,11 +226,11 @@ class _Search:
         return linear
 
     def _knots(self, distortion):
-        torques = []
+        torques, context = [], self.reduced.context
         for r, (history, blocks) in enumerate(zip(histories(self.reduced, distortion), self.reduced.blocks, strict=True)):
             middle = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
             settled = blocks.leg > 0 if blocks.direction.size > 1 else blocks.leg >= 0
-            torques.append(middle[settled] * np.exp(-distortion.drag_exponent * self.reduced.context.log_rate[r]))
+            torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
     def _linear(self, reducer, distortion, weights, covariances, start, jitter):
@@ -194,8 +251,9 @@ class _Search:
     def _solve(self, reducer, design, angles, covariances, start):
         priors = class_priors(reducer)
         for effect in self.effects:
-            level = float(np.log(effect.present(self.reduced.context)))
-            priors[effect.name] = (level, 0.0 if effect is BENCH_HYSTERESIS else WIDE)
+            free = effect is not BENCH_HYSTERESIS and (self.only is None or effect.name in self._acting)
+            level = effect.present(self.reduced.context) if free else effect.trace(self.reduced.context)
+            priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.trust)
         scales = design.scales(priors)
@@ -210,6 +268,11 @@ class _Search:
             log_scale, solution = find_scales(data, scales, begin, 12)
             found.append((solution.log_marginal + scales.log_prior(log_scale), log_scale, solution))
         return data, *max(found, key=lambda f: f[0])[1:]
+
+    @property
+    def _acting(self) -> set[str]:
+        """Terms of the effects that alone may act."""
+        return {t.name for n in self.only or () for t in all_effects().get(n, ())}
 
     def _moved(self, linear):
         weights = linear.weights
@@ -232,7 +295,7 @@ def _shift(design, distortion, effects):
 def _step(moved, distortion, context):
     """Step in shares of the torque scale; exponents weigh a fiftieth."""
     step = np.array([getattr(moved, n) - getattr(distortion, n) for n in vars(distortion)])
-    return step * [1.0, context.rate.max(), 0.02, 0.02]
+    return step * [1.0, context.rate.max(), 0.02, 0.02, 0.02, 0.02]
 
 
 def _length(moved, distortion, context) -> float:

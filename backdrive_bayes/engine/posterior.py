@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from backdrive_bayes.engine.diagnostics import Convergence
-from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, GrowthEffect, PathEffect
 from backdrive_bayes.mechanics.history import History, through
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
@@ -94,7 +94,7 @@ class Posterior:
         """
         log_rate = self._log_rate(rate_nm_per_s)
         found = np.zeros(())
-        base = self.reducer.ends(history, self.distortion.exponents, log_rate)
+        base = self.reducer.ends(history, self.distortion.growth(log_rate, self.context))
         for name, columns in base.items():
             if modules is None or self.reducer.part(name).module in modules:
                 found = found + self.flat[name] @ columns.T
@@ -104,23 +104,20 @@ class Posterior:
 
     def _effects(self, history, log_rate, base):
         """What effects of the reducer itself add, (draws, segments) in shares of the angle scale."""
-        found = 0.0
+        found, mean = 0.0, {n: self.flat[n].mean(axis=0) for n in base}
+        growth = self.distortion.growth(log_rate, self.context)
         for effect in self.effects:
             if effect.name not in self.flat or not effect.of_reducer:
                 continue
             if isinstance(effect, PathEffect):
                 found = found + self.flat[effect.name] @ effect.responses(history, 0, self.context)[1].T
             elif isinstance(effect, FlankEffect):
-                mean = {n: self.flat[n].mean(axis=0) for n in base}
-                even = self.reducer.flank_columns(history, mean, self.distortion.exponents, log_rate, ends=True)
+                even = self.reducer.flank_columns(history, mean, growth, ends=True)
                 found = found + self.flat[effect.name] @ even.T
-            elif isinstance(effect, TangentEffect):
-                moved = replace(self.distortion, **{effect.parameter: getattr(self.distortion, effect.parameter) + effect.step})
-                there = self.reducer.ends(history, moved.exponents, log_rate)
-                mean = {n: self.flat[n].mean(axis=0) for n in base}
-                slope = sum((there[n] - base[n]) @ mean[n] for n in base) / effect.step
+            elif isinstance(effect, GrowthEffect):
+                grown = self.reducer.grown(history, mean, growth, ends=True)[:, effect.part]
                 away = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter)
-                found = found + away[:, None] * slope
+                found = found + np.outer(away * self.context.law(log_rate)[effect.term], grown)
         return found
 
     def along(self, time_s, torque_nm) -> np.ndarray:

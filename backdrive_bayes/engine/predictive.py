@@ -52,7 +52,7 @@ def _departures(posterior: Posterior, record: int) -> np.ndarray:
     context, distortion = posterior.context, posterior.distortion
     blocks, own = posterior.records.blocks[record], posterior.records
     history = of_blocks(blocks, context.torque_scale_nm, distortion.offset, distortion.lag_s)
-    shared = (history, distortion.exponents, context.log_rate[record])
+    shared = (history, distortion.growth(context.log_rate[record], context))
     columns = posterior.reducer.columns(*shared)
     mean = posterior.flat["clearance"].mean(axis=0) if "clearance" in posterior.flat else None
     columns |= posterior.reducer.initial_columns(history, mean, *shared[1:])

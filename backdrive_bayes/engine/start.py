@@ -8,6 +8,9 @@ from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import Distortion
 
 LEVELS = np.linspace(-0.9, 0.9, 73)
+TORQUES = np.linspace(-0.97, 0.97, 389)
+SHIFTS = np.linspace(-0.4, 0.4, 401)
+"""Torques at which legs are compared, and offsets that are tried, in shares of the torque scale."""
 USUAL = np.array([0.05, 0.2, 1.0])
 """Standard deviations by which the least squares are held: offset [torque scale], lag [torque scale a unit rate], exponent."""
 
@@ -32,7 +35,32 @@ def possible_starts(reduced: Reduced) -> list[Distortion]:
         used = np.array([1, 1, lag, drag])
         found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(4)], rcond=None)[0] * used
         starts.append(Distortion(float(found[1]), float(found[2] / fastest), 0.0, float(np.clip(found[3], -0.5, 0.5))))
-    return starts
+    return [*starts, Distortion(offset=_oddest_offset(reduced))]
+
+
+def _oddest_offset(reduced) -> float:
+    """Offset about which rising legs and mirrored falling ones agree best, up to an offset of the angle."""
+    legs = {1.0: [], -1.0: []}
+    for blocks, angle in zip(reduced.blocks, reduced.angles, strict=True):
+        for k in range(1 if blocks.direction.size > 1 else 0, blocks.direction.size):
+            own, sign = blocks.leg == k, float(blocks.direction[k])
+            if abs(blocks.turning_nm[k + 1] - blocks.turning_nm[k]) > 1.2 * reduced.torque_scale_nm:
+                z = blocks.torque_nm[own] * sign / reduced.torque_scale_nm
+                legs[sign].append(np.interp(TORQUES, z, angle[own] * sign))
+    if not legs[1.0] or not legs[-1.0]:
+        return 0.0
+    up, down = np.mean(legs[1.0], axis=0), np.mean(legs[-1.0], axis=0)
+    variance = reduced.context.angle_noise**2 + (reduced.context.torque_noise * np.gradient(up, TORQUES)) ** 2
+
+    def unevenness(shift):
+        inside = np.abs(TORQUES) < TORQUES[-1] - abs(shift)
+        read = TORQUES[inside] - shift
+        weight = 1.0 / np.interp(read, TORQUES, variance)
+        apart = np.interp(read, TORQUES, up) - np.interp(TORQUES[inside] + shift, TORQUES, down)
+        middle = np.sum(weight * apart) / weight.sum()
+        return float(np.mean(weight * (apart - middle) ** 2))
+
+    return float(min(SHIFTS, key=unevenness))
 
 
 def _crossings(reduced):

@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.mechanics.effect import GrowthEffect
 
 HEIGHT = 0.3
 """Standard deviations of the noise by which a trace may move the angle where it acts most."""
 
 
 def trace_of(linear: Linear, effect) -> float:
-    """Trace level of an effect's weights: its own; for an exponent of the rate what moves the angle by HEIGHT, if
+    """Trace level of an effect's weights: its own; for an exponent or a bend of the rate's law what moves the angle by HEIGHT, if
     that is more."""
     own = effect.trace(linear.reduced.context)
-    if not getattr(effect, "parameter", "").endswith("exponent") or effect.name not in linear.design.names:
+    if not isinstance(effect, GrowthEffect) or effect.name not in linear.design.names:
         return own
     group = linear.design.groups[linear.design.names.index(effect.name)]
     heights = []

@@ -10,10 +10,10 @@ from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.infer import infer, prepare
 from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.one_thread import one_thread
-from backdrive_bayes.engine.periodic import wave_group
+from backdrive_bayes.engine.periodic import AMPLITUDE, WAVE, wave_group
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities
-from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, UNEXPLAINED, WAVE, Weighed, weigh
+from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, UNEXPLAINED, Weighed, weigh
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 from backdrive_bayes.records.record import Unit
@@ -32,9 +32,9 @@ def weighed_unit(unit: Unit, modules=BASELINE, allowed=None, note=lambda text: N
     """The effects of a unit weighed, by the same call for a fit and its diagnosis; what was read from the same files is kept."""
     key = (unit.file_sha256, unit.data_sha256, modules, allowed)
     if not unit.file_sha256 or key not in _LAST:
-        linear = prepare(unit, modules, note)
+        linears = prepare(unit, modules, note)
         note("weighing effects")
-        found = weigh(linear, allowed)
+        found = weigh(linears, allowed)
         _LAST.clear()
         if not unit.file_sha256:
             return found
@@ -48,7 +48,8 @@ def fit_posterior(unit: Unit, modules=BASELINE, seed: int = 0, note=lambda text:
         weighed = weighed_unit(unit, tuple(modules), None, note)
         joint = probabilities.probabilities(weighed.log_factor, weighed.left, {})
         likeliest = sorted(joint.items(), key=lambda item: -item[1])[:MOST]
-        kept = [(h, p) for h, p in likeliest if p >= LEAST * likeliest[0][1]]
+        mode = weighed.of(likeliest[0][0])
+        kept = [(h, p) for h, p in likeliest if p >= LEAST * likeliest[0][1] and weighed.of(h) is mode]
         drawn = [(posterior_of(weighed, h, seed, note), p) for h, p in kept]
     return mixed(drawn)
 
@@ -64,11 +65,11 @@ def posterior_of(weighed: Weighed, effects: tuple[str, ...], seed: int, note=lam
 
 def with_columns(weighed: Weighed, effects: tuple[str, ...]) -> Linear:
     """The linear model with the columns of effects that it does not hold yet: an encoder's wave, what is unexplained."""
-    linear, groups, scales = weighed.linear, [], {}
+    linear, groups, scales = weighed.of(effects), [], {}
     if ENCODER in effects:
         frequency = weighed.frequency.get(tuple(effects)) or next(f for h, f in weighed.frequency.items() if ENCODER in h)
-        groups.append(replace(wave_group(linear, frequency), name="wave"))
-        scales["wave"] = float(np.log(WAVE))
+        groups.append(replace(wave_group(linear, frequency), name=WAVE))
+        scales[WAVE] = float(np.log(AMPLITUDE))
     if UNEXPLAINED in effects or STICK_SLIP in effects:
         groups.append(path_group(linear.reduced, UNKNOWN))
         scales[UNKNOWN.name] = float(np.log(UNKNOWN.present(linear.reduced.context)))

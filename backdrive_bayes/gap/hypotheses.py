@@ -3,39 +3,38 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from backdrive_bayes.engine.contrasts import SIZE_WEIGHTS, SIZES, Contrasts, averaged, make_contrasts
-from backdrive_bayes.engine.design import Design, Group, path_group
+from backdrive_bayes.engine.design import Group, path_group
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
-from backdrive_bayes.engine.linearise import Linear, linearise
-from backdrive_bayes.engine.periodic import FREQUENCIES, wave_group
+from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.marginal import find_scales
+from backdrive_bayes.engine.periodic import AMPLITUDE, FREQUENCIES, WAVE, wave_group
 from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.engine.unlisted import module_group, step_group
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 
 ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
-WAVE = 6e-3
-"""Usual amplitude of an encoder's wave, and of a step in time, in shares of the angle scale."""
 MODULE_CHANGE = 0.05
 """Usual change of a module in shares of itself."""
 KINDS = (UNEXPLAINED, "module_change", "step")
 """What something unlisted may be: a process on each leg, a module that changes in time, a step in time; each as likely."""
 PAIRED = 6
 """Effects that are tried in pairs: those that explain most alone."""
-CLEAR = 20.0
-"""Log Bayes factor from which an encoder's wave is taken into the linear model before all is weighed again."""
 
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """Log marginal likelihoods of sets of effects, relative to none, with what they rest on."""
 
-    linear: Linear
+    linears: tuple[Linear, ...]
+    mode: dict[tuple[str, ...], int]
     log_factor: dict[tuple[str, ...], float]
     frequency: dict[tuple[str, ...], float]
     jumps: Jumps
@@ -43,49 +42,58 @@ class Weighed:
     contrasts: float
     posteriors: dict = field(default_factory=dict)
 
+    @property
+    def linear(self) -> Linear:
+        """The linear model about the mode of the best hypothesis."""
+        return self.of(max(self.log_factor, key=self.log_factor.__getitem__))
 
-def weigh(linear: Linear, allowed=None) -> Weighed:
-    """Weigh none, every effect and the pairs of the most promising; ``allowed`` restricts the names.
-
-    A clear wave is first taken into the linear model, because it leaves residuals that bend everything else.
-    """
-    found = _weigh(linear, allowed)
-    best = max(found.log_factor, key=lambda h: found.log_factor[h])
-    if ENCODER in best and found.log_factor[best] > CLEAR:
-        wave = wave_group(linear, found.frequency[best])
-        again = linearise(linear.reduced, linear.effects, linear.reducer.modules, (Group("wave", wave.columns),))
-        if again.log_marginal > linear.log_marginal:
-            return _weigh(_without_wave(again), allowed)
-    return found
+    def of(self, effects: tuple[str, ...]) -> Linear:
+        """The linear model about the mode where a hypothesis is most likely."""
+        return self.linears[self.mode.get(tuple(effects), 0)]
 
 
-def _without_wave(linear: Linear) -> Linear:
-    from dataclasses import replace
+def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
+    """Weigh none, every effect and the pairs of the most promising about every mode; ``allowed`` restricts the names."""
+    jumps = find_jumps(linears[0])
+    tables = []
+    for linear in linears:
+        bank = Group("bank", wave_group(linear, FREQUENCIES).columns)
+        contrasts = make_contrasts(linear, (path_group(linear.reduced, UNKNOWN), module_group(linear), step_group(linear), bank))
+        tables.append(_Table(linear, contrasts, jumps.log_factor > 0))
+    names = [n for n in (*tables[0].terms, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
+    leap = {n: jumps.log_factor if n == STICK_SLIP else 0.0 for n in names}
 
-    design = Design(tuple(g for g in linear.design.groups if g.name != "wave"))
-    data = linear.whitened(design)
-    scales = {n: s for n, s in linear.log_scale.items() if n != "wave"}
-    keep = linear.design.index != linear.design.names.index("wave")
-    solution = replace(linear.solution, mean=linear.solution.mean[keep], root=linear.solution.root[keep])
-    return replace(linear, design=design, data=data, log_scale=scales, solution=solution)
+    def weighed(hypotheses, level):
+        logs = [[t.log_marginal(h) + sum(leap[n] for n in h) + lift for h in hypotheses] for t, lift in zip(tables, level, strict=True)]
+        return dict(zip(hypotheses, zip(np.max(logs, axis=0), np.argmax(logs, axis=0), strict=True), strict=True))
+
+    level = [_level(linear, table, names) if len(linears) > 1 else 0.0 for linear, table in zip(linears, tables, strict=True)]
+    found = weighed([(), *((n,) for n in names)], level)
+    best = sorted(names, key=lambda n: -found[(n,)][0])[:PAIRED]
+    found |= weighed(list(itertools.combinations(sorted(best), 2)), level)
+    mode = {h: int(m) for h, (_, m) in found.items()}
+    log = {h: float(v - found[()][0]) for h, (v, _) in found.items()}
+    frequency = {h: tables[m].frequency[h] for h, m in mode.items() if h in tables[m].frequency}
+    left = {h: tables[m].left(h) for h, m in mode.items() if UNEXPLAINED not in h}
+    return Weighed(tuple(linears), mode, log, frequency, jumps, left, tables[0].contrasts.samples)
 
 
-def _weigh(linear: Linear, allowed) -> Weighed:
-    bank = Group("bank", wave_group(linear, FREQUENCIES).columns)
-    groups = (path_group(linear.reduced, UNKNOWN), module_group(linear), step_group(linear), bank)
-    contrasts = make_contrasts(linear, groups)
-    jumps = find_jumps(linear)
-    table = _Table(linear, contrasts, jumps.log_factor > 0)
-    names = [n for n in (*table.terms, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
-    log: dict[tuple[str, ...], float] = {(): table.log_marginal(())}
-    for name in names:
-        log[(name,)] = table.log_marginal((name,)) + (jumps.log_factor if name == STICK_SLIP else 0.0)
-    best = sorted(names, key=lambda n: -log[(n,)])[:PAIRED]
-    for pair in itertools.combinations(sorted(best), 2):
-        log[pair] = table.log_marginal(pair) + (jumps.log_factor if STICK_SLIP in pair else 0.0)
-    relative = {h: float(v - log[()]) for h, v in log.items()}
-    left = {h: table.left(h) for h in log if UNEXPLAINED not in h}
-    return Weighed(linear, relative, table.frequency, jumps, left, contrasts.samples)
+def _level(linear: Linear, table: _Table, names) -> float:
+    """What turns a table's log marginal likelihoods into those that compare between modes: that of its best single effect with the
+    scales of the class learnt, less the table's own."""
+    singles = [(), *((n,) for n in names if n not in (UNEXPLAINED, STICK_SLIP))]
+    log = {h: table.log_marginal(h) for h in singles}
+    best = max(log, key=log.__getitem__)
+    own = linear
+    scales = linear.design.scales(levels(linear, best))
+    if ENCODER in best:
+        wave = replace(wave_group(linear, table.frequency[best]), name=WAVE)
+        design = linear.design.joined(wave)
+        own = replace(linear, design=design, data=linear.whitened(design), log_scale=linear.log_scale | {WAVE: float(np.log(AMPLITUDE))})
+        scales = own.design.scales(levels(own, best))
+    start = np.where(scales.free, [own.log_scale[n] for n in own.design.names], scales.mean)
+    log_scale, solution = find_scales(own.data, scales, start)
+    return solution.log_marginal + own.data.log_volume + scales.log_prior(log_scale) - log[best]
 
 
 class _Table:
@@ -139,7 +147,7 @@ class _Table:
         scale = self.scale(self._on(hypothesis), SIZES[-1])
         if hypothesis in self.frequency:
             at = int(np.argmin(np.abs(FREQUENCIES - self.frequency[hypothesis])))
-            scale[self._columns("bank", 2)[at]] = WAVE * SIZES[-1]
+            scale[self._columns("bank", 2)[at]] = AMPLITUDE * SIZES[-1]
         return self.contrasts.chi2(scale)
 
     def _columns(self, bank, width) -> np.ndarray:
@@ -155,7 +163,7 @@ class _Table:
         for size in SIZES if on else (1.0,):
             for member in SIZES:
                 scale = self.scale(on, size)
-                scale[self._columns(bank, width)[at]] = member * WAVE
+                scale[self._columns(bank, width)[at]] = member * AMPLITUDE
                 found.append(self.contrasts.log_marginal(scale))
         by_size = np.reshape(found, (-1, SIZES.size))
         return float((averaged([averaged(f) for f in by_size]) if on else averaged(by_size[0])) - price), at
@@ -177,7 +185,7 @@ class _Table:
         gram = c.gram[index[:, :, None], index[:, None, :]] - np.einsum("fim,fjm->fij", members, members)
         gains = []
         for size in SIZES:
-            variance = (size * WAVE) ** 2
+            variance = (size * AMPLITUDE) ** 2
             inner = np.eye(width) + variance * gram
             solved = np.linalg.solve(inner, left[:, :, None])[:, :, 0]
             gains.append(0.5 * precision * variance * np.sum(left * solved, axis=1) - 0.5 * np.linalg.slogdet(inner)[1])

@@ -6,7 +6,7 @@ import numpy as np
 
 from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.gap.shrink import Fitted
-from backdrive_bayes.mechanics.effect import FlankEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import FlankEffect, GrowthEffect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
 
 POINTS = 80
@@ -60,8 +60,10 @@ def _predict(linear: Linear, fitted: Fitted, history: History, rate: float) -> n
     weights = fitted.design.split(fitted.mean)
     context = linear.reduced.context
     log_rate = float(np.log(rate) - np.log(context.rate).mean())
-    base = linear.reducer.ends(history, linear.distortion.exponents, log_rate)
-    angle = sum(base[n] @ weights[n] for n in base)
+    growth = linear.distortion.growth(log_rate, context)
+    base = linear.reducer.ends(history, growth)
+    mean = {n: weights[n] for n in base}
+    angle = sum(base[n] @ mean[n] for n in base)
     z, direction = history.z1, np.sign(history.z1 - history.z0)
     slope = np.gradient(angle, np.arange(angle.size)) / np.maximum(np.abs(np.gradient(z, np.arange(z.size))), 1e-9)
     for effect in linear.effects:
@@ -72,13 +74,13 @@ def _predict(linear: Linear, fitted: Fitted, history: History, rate: float) -> n
             columns = effect.responses(history, 0, context)[1]
             angle = angle + columns @ weight[: columns.shape[1]]
         elif isinstance(effect, FlankEffect):
-            mean = {n: weights[n] for n in base}
-            angle = angle + linear.reducer.flank_columns(history, mean, linear.distortion.exponents, log_rate, ends=True) @ weight
+            angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight
         elif isinstance(effect, TangentEffect):
             away = float(weight[0]) - getattr(linear.distortion, effect.parameter)
-            by = {"offset": direction * slope, "lag_s": -rate * slope}.get(effect.parameter)
-            if by is None:
-                by = log_rate * slope * np.abs(z) * -direction * 0.1
+            if isinstance(effect, GrowthEffect):
+                by = linear.reducer.grown(history, mean, growth, ends=True)[:, effect.part] * context.law(log_rate)[effect.term]
+            else:
+                by = {"offset": direction * slope, "lag_s": -rate * slope}[effect.parameter]
             angle = angle + away * by
     return angle
 

@@ -8,6 +8,9 @@ import numpy as np
 
 from backdrive_bayes.mechanics.history import History
 
+MOST_GROWTH = 3.0
+"""Log factor of thresholds beyond which no law of the rate is followed."""
+
 
 @dataclass(frozen=True, eq=False)
 class Context:
@@ -29,6 +32,10 @@ class Context:
     def log_rate(self) -> np.ndarray:
         """Logarithms of the rates over their geometric mean, (records,)."""
         return np.log(self.rate) - np.log(self.rate).mean()
+
+    def law(self, log_rate: float) -> tuple[float, float]:
+        """What an exponent and a bend of a law of the rate are multiplied by; the records' mean bend is none."""
+        return float(log_rate), float(log_rate**2 - np.mean(self.log_rate**2))
 
 
 @dataclass(frozen=True)
@@ -71,11 +78,21 @@ class PathEffect(Effect):
 class TangentEffect(Effect):
     """An effect that moves a nonlinear parameter of the operator: its column is the derivative of the present prediction.
 
-    ``parameter`` is the place of the parameter in :class:`Distortion`, ``step`` the step of the difference quotient.
+    ``parameter`` is the place of the parameter in :class:`Distortion`.
     """
 
     parameter: str = ""
-    step: float = 2e-5
+
+
+@dataclass(frozen=True)
+class GrowthEffect(TangentEffect):
+    """An effect by which the thresholds of one part follow the rate: the derivative by their growth times a term of the law.
+
+    ``part`` is the number of friction (0) or drag (1), ``term`` that of exponent (0) or bend (1).
+    """
+
+    part: int = 0
+    term: int = 0
 
 
 @dataclass(frozen=True)
@@ -92,15 +109,21 @@ class SpreadEffect(Effect):
 class Distortion:
     """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
 
-    ``offset`` is a share of the torque scale, ``lag_s`` in seconds; friction and drag thresholds grow with rate to these powers.
+    ``offset`` is a share of the torque scale, ``lag_s`` in seconds; the logarithms of friction and drag thresholds follow the log
+    of the rate with these exponents and bends.
     """
 
     offset: float = 0.0
     lag_s: float = 0.0
     friction_exponent: float = 0.0
     drag_exponent: float = 0.0
+    friction_bend: float = 0.0
+    drag_bend: float = 0.0
 
-    @property
-    def exponents(self) -> tuple[float, float]:
-        """Exponents of friction and drag."""
-        return self.friction_exponent, self.drag_exponent
+    def growth(self, log_rate: float, context: Context) -> tuple[float, float]:
+        """Logarithms of the factors of friction and drag thresholds at a rate."""
+        line, bend = context.law(log_rate)
+        growth = np.array([self.friction_exponent, self.drag_exponent]) * line
+        growth += np.array([self.friction_bend, self.drag_bend]) * bend
+        friction, drag = np.clip(growth, -MOST_GROWTH, MOST_GROWTH)
+        return float(friction), float(drag)

@@ -24,6 +24,8 @@ READ_OUTS = (0.0, 0.04, 0.12, 0.28, 0.5, 0.75, 0.9, 1.0)
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
 INITIAL_THRESHOLDS = (0.01, 0.04, 0.12, 0.3, 0.6)
 """Thresholds at which a record's friction may have been left anywhere."""
+GROWTH_STEP = 2e-3
+"""Step of the difference quotients by the growth of thresholds."""
 ZONES = 12
 """Groups of clearance relays whose first state is free in each record."""
 BASELINE = ("geometric", "elastic", "friction")
@@ -76,39 +78,55 @@ class ReducerClass:
         """Whether the class holds a part of this name."""
         return any(p.name == name for p in self.parts)
 
-    def columns(self, history: History, exponents=(0.0, 0.0), log_rate: float = 0.0) -> dict[str, np.ndarray]:
+    def columns(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """Block means of every part's columns, (blocks, weights) by name.
 
-        Friction and drag thresholds are multiplied by exp(exponent · log_rate).
+        Friction and drag thresholds are multiplied by exp(growth).
         """
-        return {p.name: p.mix(self._cells(p, exponents, log_rate).means(history)) for p in self.parts}
+        return {p.name: p.mix(self._cells(p, growth).means(history)) for p in self.parts}
 
-    def ends(self, history: History, exponents=(0.0, 0.0), log_rate: float = 0.0) -> dict[str, np.ndarray]:
+    def grown(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False) -> np.ndarray:
+        """Derivatives of the block means with independent ``weights`` by the growth of friction and of drag, (blocks, 2),
+        or at the segments' ends."""
+        columns = []
+        for k, name in enumerate(("friction", "clearance")):
+            part = self.part(name)
+            if part is None:
+                columns.append(np.zeros(history.z1.size if ends else history.blocks))
+                continue
+            more = tuple(g + GROWTH_STEP * (i == k) for i, g in enumerate(growth))
+            cells = (self._cells(part, g) for g in (more, growth))
+            there, here = (c.ends(history) if ends else c.means(history) for c in cells)
+            columns.append((there - here) @ part.weights(weights[name]) / GROWTH_STEP)
+        return np.stack(columns, axis=1)
+
+    def ends(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """The same at the end of every segment."""
-        return {p.name: p.mix(self._cells(p, exponents, log_rate).ends(history)) for p in self.parts}
+        return {p.name: p.mix(self._cells(p, growth).ends(history)) for p in self.parts}
 
-    def flank_columns(self, history: History, weights, exponents=(0.0, 0.0), log_rate: float = 0.0, ends: bool = False):
+    def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
         columns = []
         for part in self.parts:
-            cells = self._cells(part, exponents, log_rate)
+            cells = self._cells(part, growth)
             even = cells.ends(history, sign=-1.0) if ends else cells.means(history, sign=-1.0)
             columns.append(even @ part.weights(weights[part.name]))
         return np.stack(columns, axis=1)
 
-    def initial_columns(self, history: History, clearance_weights=None, exponents=(0.0, 0.0), log_rate: float = 0.0):
+    def initial_columns(self, history: History, clearance_weights=None, growth=(0.0, 0.0)):
         """What a record's unknown initial state adds: columns of friction left up or down, and of clearance zones left up.
 
         ``clearance_weights`` (cells,) are the present weights of the clearance, that a zone's state moves.
         """
         found = {}
         if self.has("friction"):
-            plays = [Cells(*(np.array([v]) for v in (r - TOP, -r - TOP, 2 * TOP, 2.0))) for r in INITIAL_THRESHOLDS]
-            neutral, upper, lower = (np.hstack([p.means(history, s) for p in plays]) for s in ("neutral", "upper", "lower"))
+            r, one = np.array(INITIAL_THRESHOLDS), np.ones(len(INITIAL_THRESHOLDS))
+            plays = Cells(r - TOP, -r - TOP, 2 * TOP * one, 2 * one)
+            neutral, upper, lower = (plays.means(history, s) for s in ("neutral", "upper", "lower"))
             found["initial"] = np.hstack([upper - neutral, lower - neutral])
         if self.has("clearance"):
             part = self.part("clearance")
-            cells = self._cells(part, exponents, log_rate)
+            cells = self._cells(part, growth)
             moved = cells.means(history, "upper") - cells.means(history)
             weights = (
                 np.abs(clearance_weights) if clearance_weights is not None else np.full(cells.count, np.exp(part.log_scale[0]))
@@ -118,12 +136,9 @@ class ReducerClass:
             found["floating"] = np.stack([moved[:, zone == k] @ weights[zone == k] for k in range(ZONES)], axis=1)
         return found
 
-    def _cells(self, part, exponents, log_rate):
-        if part.name == "friction" and exponents[0] * log_rate:
-            return part.cells.wider(float(np.exp(exponents[0] * log_rate)))
-        if part.name == "clearance" and exponents[1] * log_rate:
-            return part.cells.wider(float(np.exp(exponents[1] * log_rate)))
-        return part.cells
+    def _cells(self, part, growth):
+        own = {"friction": growth[0], "clearance": growth[1]}.get(part.name, 0.0)
+        return part.cells.wider(float(np.exp(own))) if own else part.cells
 
 
 def _elastic() -> Part:

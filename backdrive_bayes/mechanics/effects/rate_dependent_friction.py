@@ -1,9 +1,11 @@
-"""Friction and drag that depend on the loading rate, of either sign."""
+"""Friction and drag that depend on the loading rate, rising or falling, with a bend where the law has a minimum or saturates."""
 
-from backdrive_bayes.mechanics.effect import TangentEffect
+from backdrive_bayes.mechanics.effect import GrowthEffect
+
+SOURCE = "Stribeck's law over a narrow range of rates; Armstrong-Hélouvry et al., Automatica 30, 1994"
 
 
-class RateExponent(TangentEffect):
+class RateExponent(GrowthEffect):
     """Thresholds follow a power of the loading rate."""
 
     def trace(self, context):
@@ -15,12 +17,23 @@ class RateExponent(TangentEffect):
         return 0.05
 
 
-FRICTION_RATE = RateExponent(
-    "friction_rate", "rate independence", "width changes with the log of the rate, without relaxation",
-    "Stribeck's law over a narrow range of rates; Armstrong-Hélouvry et al., Automatica 30, 1994", "1", True, False,
-    "friction_exponent", 2e-3,
-)
-DRAG_RATE = RateExponent(
-    "drag_rate", "rate independence", "the drag of the clearance changes with the log of the rate",
-    "as for friction", "1", True, False, "drag_exponent", 2e-3,
-)
+class RateBend(GrowthEffect):
+    """The exponent itself changes with the rate."""
+
+    def trace(self, context):
+        """A quarter of the exponent's."""
+        return 1e-3
+
+    def present(self, context):
+        """A third of the exponent's."""
+        return 0.015
+
+
+def _term(kind, name, signature, part, term):
+    return kind(name, "rate independence", signature, SOURCE, parameter=name.replace("rate", "exponent"), part=part, term=term)
+
+
+FRICTION_RATE = _term(RateExponent, "friction_rate", "width changes with the log of the rate, without relaxation", 0, 0)
+DRAG_RATE = _term(RateExponent, "drag_rate", "the drag of the clearance changes with the log of the rate", 1, 0)
+FRICTION_BEND = _term(RateBend, "friction_bend", "the width's law of the rate bends", 0, 1)
+DRAG_BEND = _term(RateBend, "drag_bend", "the drag's law of the rate bends", 1, 1)
