@@ -11,6 +11,8 @@ from backdrive_bayes.records.reduction import Blocks
 
 PIECES = 3
 """Straight pieces a block: the torque within a block is nearly straight, turning points are nodes of their own."""
+FEW = 6
+"""Samples up to which a block's mean is that of its samples: the steps between them are then no part of what was read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,16 +53,31 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     ends = np.array([blocks.end_s[blocks.leg == k][-1] for k in range(blocks.direction.size)])
     turns = np.r_[blocks.begin_s[0], ends]
     time, torque = np.r_[turns, blocks.mid_s], np.r_[blocks.turning_nm, blocks.torque_nm]
-    order = np.argsort(time, kind="stable")
+    along = np.argsort(time, kind="stable")
+    sampled, who = _samples(blocks)
     share = np.linspace(0.0, 1.0, PIECES + 1)
-    edges = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share - lag_s
-    cuts = np.unique(np.r_[edges.ravel(), turns[1:-1]])
-    z = np.interp(cuts, time[order], torque[order]) / torque_scale_nm + offset
+    pieces = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
+    sampled, edges = sampled - lag_s, pieces[blocks.count > FEW].ravel() - lag_s
+    cuts = np.unique(np.r_[edges, sampled, turns[1:-1], pieces[[0, -1], [0, -1]] - lag_s])
     owner = np.searchsorted(blocks.begin_s - lag_s, 0.5 * (cuts[1:] + cuts[:-1]), side="right") - 1
     owner = np.clip(owner, 0, blocks.count.size - 1)
-    span = np.diff(cuts)
-    weight = span / np.bincount(owner, span, blocks.count.size)[owner]
-    return History(z[:-1], z[1:], cuts[:-1], cuts[1:], owner, weight, blocks.count.size)
+    span = np.diff(cuts) * (blocks.count[owner] > FEW)
+    weight = span / np.maximum(np.bincount(owner, span, blocks.count.size)[owner], 1e-300)
+    # A sample is a segment without length, after the one that leads to it.
+    t0, t1 = np.r_[cuts[:-1], sampled], np.r_[cuts[1:], sampled]
+    owner, weight = np.r_[owner, who], np.r_[weight, 1.0 / blocks.count[who]]
+    order = np.lexsort((t0, t1))
+    z0, z1 = (np.interp(t[order], time[along], torque[along]) / torque_scale_nm + offset for t in (t0, t1))
+    return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size)
+
+
+def _samples(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
+    """Instants [s] of the samples of all blocks that have few, and the blocks they belong to."""
+    few = np.flatnonzero(blocks.count <= FEW)
+    who = np.repeat(few, blocks.count[few])
+    number = np.arange(who.size) - np.repeat(np.cumsum(blocks.count[few]) - blocks.count[few], blocks.count[few])
+    share = (number + 0.5) / blocks.count[who]
+    return blocks.begin_s[who] + share * (blocks.end_s - blocks.begin_s)[who], who
 
 
 def through(time_s, torque_nm, torque_scale_nm: float) -> History:
