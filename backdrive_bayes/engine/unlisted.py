@@ -1,4 +1,5 @@
-"""What something unlisted may look like beside a process on each leg: a module that changes in time, a step in time."""
+"""What something unlisted may look like beside a process on each leg: a module that changes in time, a step in time, legs of the two
+directions that differ anywhere in the torque."""
 
 from __future__ import annotations
 
@@ -7,6 +8,8 @@ import numpy as np
 from backdrive_bayes.engine.design import Group
 from backdrive_bayes.engine.linearise import Linear
 
+NODES = np.linspace(-0.98, 0.98, 50)
+"""Torques at which legs of the two directions may part."""
 EVERY = 4
 """Blocks between the instants at which a step is looked for: a step's column changes little over a few blocks."""
 
@@ -33,3 +36,12 @@ def step_group(linear: Linear) -> Group:
         number = np.arange(blocks.count.size)
         columns.append((number[:, None] >= number[EVERY:-EVERY:EVERY]).astype(float))
     return Group("step", tuple(columns), own=True)
+
+
+def uneven_group(linear: Linear) -> Group:
+    """Rising legs against mirrored falling ones: a walk along the torque in the direction of motion, the same in all records."""
+    columns = []
+    for blocks in linear.reduced.blocks:
+        along = blocks.torque_nm / linear.reduced.torque_scale_nm * blocks.direction[blocks.leg]
+        columns.append((along[:, None] > NODES).astype(float))
+    return Group("uneven", tuple(columns))

@@ -17,14 +17,15 @@ from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import AMPLITUDE, FREQUENCIES, WAVE, wave_group
 from backdrive_bayes.engine.traces import trace_of
-from backdrive_bayes.engine.unlisted import module_group, step_group
+from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 
 ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
 MODULE_CHANGE = 0.05
 """Usual change of a module in shares of itself."""
-KINDS = (UNEXPLAINED, "module_change", "step")
-"""What something unlisted may be: a process on each leg, a module that changes in time, a step in time; each as likely."""
+KINDS = (UNEXPLAINED, "module_change", "uneven", "step")
+"""What something unlisted may be: a process on each leg, a module that changes in time, legs of two directions that part, a step
+in time; each as likely."""
 PAIRED = 6
 """Effects that are tried in pairs: those that explain most alone."""
 
@@ -58,7 +59,7 @@ def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
     tables = []
     for linear in linears:
         bank = Group("bank", wave_group(linear, FREQUENCIES).columns)
-        contrasts = make_contrasts(linear, (path_group(linear.reduced, UNKNOWN), module_group(linear), step_group(linear), bank))
+        contrasts = make_contrasts(linear, (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear), bank))
         tables.append(_Table(linear, contrasts, jumps.log_factor > 0))
     names = [n for n in (*tables[0].terms, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
     leap = {n: jumps.log_factor if n == STICK_SLIP else 0.0 for n in names}
@@ -104,7 +105,7 @@ class _Table:
         effects = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}
         self.names = contrasts.names
         self.trace = np.array([trace_of(linear, effects[n]) if n in effects else 0.0 for n in self.names])
-        usual = {n: e.present(context) for n, e in effects.items()} | {"module_change": MODULE_CHANGE}
+        usual = {n: e.present(context) for n, e in effects.items()} | {"module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         listed = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()}
         self.terms = {n: t for n, t in listed.items() if any(x in self.names for x in t)} | {UNEXPLAINED: (UNEXPLAINED,)}
@@ -124,7 +125,7 @@ class _Table:
             return self._of_terms(hypothesis, self._on(hypothesis))
         listed = tuple(n for n in hypothesis if n != UNEXPLAINED)
         on = self._on(listed)
-        kinds = [self._of_terms(hypothesis, on | {k}) for k in KINDS[:2]]
+        kinds = [self._of_terms(hypothesis, on | {k}) for k in KINDS[:3]]
         if ENCODER not in hypothesis:
             kinds.append(self._with_bank(on, "step", 1)[0])
         return float(logsumexp(kinds) - np.log(len(kinds)))

@@ -8,6 +8,8 @@ from backdrive_bayes.mechanics.history import played
 NODES = np.array([0.0, 0.01, 0.03, 0.08, 0.16, 0.28, 0.45, 0.65, 0.85, 1.2])
 BEHIND = (0.0, 0.02, 0.08, 0.3)
 """Thresholds of friction through which the even part may see the torque."""
+SMOOTH = 1.5
+"""Length over which the even slope changes with the root of the torque: stiffness bends over the whole range, damage does not."""
 
 
 class AsymmetricStiffness(PathEffect):
@@ -24,7 +26,8 @@ class AsymmetricStiffness(PathEffect):
     def responses(self, history, record, context):
         """Even integrals of pieces of |z| under a smooth prior, for every threshold; behind friction at half the size."""
         root = np.sqrt(0.5 * (NODES[1:] + NODES[:-1]))
-        mixing = np.linalg.cholesky(np.exp(-np.abs(root[:, None] - root) / 0.5))
+        near = np.exp(-0.5 * ((root[:, None] - root) / SMOOTH) ** 2)
+        mixing = np.linalg.cholesky(near + 1e-6 * np.eye(root.size))
         begin, end = [], []
         for threshold in BEHIND:
             z = played(history.z0[0], history.z1, threshold)
