@@ -121,21 +121,20 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
             trials.append((beside.log_marginal - PRICE, start, (wave,)))
     _, start, waves = max(trials, key=lambda found: found[0])
     joint = _Search(reduced, effects, modules, (*fixed, *waves)).run(start, STEPS, refine=True)
-    found = [joint]
-    bent = _bent(joint)
+    found, reach = [joint], replace(joint.distortion, offset=starts[0].offset)
+    bent = _bent(joint, reach)
     for count in range(min(len(bent), MOST_BENT) + 1 if bent else 0):
         for some in itertools.combinations(bent, count):
             search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
-            found.append(search.run(_only(joint.distortion, some), STEPS, refine=True))
+            found.append(search.run(_only(reach, some), STEPS, refine=True))
     return tuple(_without(linear, WAVE) for linear in found)
 
 
-def _bent(joint: Linear) -> tuple[str, ...]:
-    """What is too large at the joint mode to be taken back along a straight line."""
+def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
+    """What is too large at the joint mode, or where the legs agree best, to be taken back along a straight line."""
     context, large = joint.reduced.context, []
     for name, places in BENDING.items():
-        rest = replace(joint.distortion, **dict.fromkeys(places, 0.0))
-        if _length(joint.distortion, rest, context) > BENT * context.torque_noise:
+        if _length(reach, replace(reach, **dict.fromkeys(places, 0.0)), context) > BENT * context.torque_noise:
             large.append(name)
     return (*large, WAVE) if WAVE in joint.design.names else tuple(large)
 

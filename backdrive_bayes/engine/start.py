@@ -10,32 +10,32 @@ from backdrive_bayes.mechanics.effect import Distortion
 LEVELS = np.linspace(-0.9, 0.9, 73)
 TORQUES = np.linspace(-0.97, 0.97, 389)
 SHIFTS = np.linspace(-0.4, 0.4, 401)
-"""Torques at which legs are compared, and offsets that are tried, in shares of the torque scale."""
-USUAL = np.array([0.05, 0.2, 1.0])
-"""Standard deviations by which the least squares are held: offset [torque scale], lag [torque scale a unit rate], exponent."""
+FINE = np.linspace(-0.002, 0.002, 41)
+"""Torques at which legs are compared, and offsets that are tried, roughly and finely, in shares of the torque scale."""
+USUAL = np.array([0.2, 1.0])
+"""Standard deviations by which the least squares are held: lag [torque scale a unit rate], exponent."""
 
 
 def possible_starts(reduced: Reduced) -> list[Distortion]:
-    """Distortions worth starting from: with offset alone, with a lag, with a drag exponent, with both."""
+    """Distortions worth starting from: with the offset alone, with a lag, with a drag exponent, with both."""
     crossings = _crossings(reduced)
     if len(crossings) < 3:
         return [Distortion()]
-    context = reduced.context
-    torque = np.array([c[0] for c in crossings])
-    sign, record = np.array([c[1] for c in crossings]), np.array([c[2] for c in crossings])
+    context, offset = reduced.context, _oddest_offset(reduced)
+    record = np.array([r for _, _, r in crossings])
+    torque = np.array([t + sign * offset for t, sign, _ in crossings])
     base = np.median(torque, axis=0)
     weight = 1.0 / (np.abs(np.gradient(base)) + 2e-4) ** 2
     late = ((torque - base) * weight).sum(axis=1) / weight.sum()
     at = max(float((np.abs(base) * weight).sum() / weight.sum()), 1e-3)
     fastest = context.rate.max()
-    design = np.column_stack([np.ones(late.size), -sign, context.rate[record] / fastest, at * context.log_rate[record]])
+    design = np.column_stack([np.ones(late.size), context.rate[record] / fastest, at * context.log_rate[record]])
     held = np.diag(np.r_[0.0, 1e-2 / USUAL])
     starts = []
-    for lag, drag in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        used = np.array([1, 1, lag, drag])
-        found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(4)], rcond=None)[0] * used
-        starts.append(Distortion(float(found[1]), float(found[2] / fastest), 0.0, float(np.clip(found[3], -0.5, 0.5))))
-    return [*starts, Distortion(offset=_oddest_offset(reduced))]
+    for used in ([1, 0, 0], [1, 1, 0], [1, 0, 1], [1, 1, 1]):
+        found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(3)], rcond=None)[0] * used
+        starts.append(Distortion(offset, float(found[1] / fastest), 0.0, float(np.clip(found[2], -0.5, 0.5))))
+    return starts
 
 
 def _oddest_offset(reduced) -> float:
@@ -60,7 +60,8 @@ def _oddest_offset(reduced) -> float:
         middle = np.sum(weight * apart) / weight.sum()
         return float(np.mean(weight * (apart - middle) ** 2))
 
-    return float(min(SHIFTS, key=unevenness))
+    coarse = min(SHIFTS, key=unevenness)
+    return float(min(coarse + FINE, key=unevenness))
 
 
 def _crossings(reduced):

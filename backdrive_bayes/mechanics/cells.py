@@ -16,6 +16,8 @@ import numpy as np
 
 from backdrive_bayes.mechanics.history import History
 
+CROSSED = 0.7
+"""Torque, in shares of the largest, by which clearances are crossed: relays beyond stand for friction that the tip of a loop shows."""
 START = ("neutral", "upper", "lower")
 """Initial states: demagnetised (a clearance in its middle), as after a large positive torque, as after a large negative one."""
 
@@ -53,13 +55,12 @@ class Cells:
         return np.isclose(self.up, -(self.down + self.width)) & (self.up >= 0.0)
 
     def wider(self, factor: float) -> Cells:
-        """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays."""
+        """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays, and stay where they
+        are beyond CROSSED."""
         clearance = self.clearance
-        shift = (factor - 1.0) * self.threshold
-        scale = np.where(clearance, factor, 1.0)
-        up = np.where(clearance, factor * self.up, self.up + shift)
-        down = np.where(clearance, factor * self.down, self.down - shift)
-        return Cells(up, down, scale * self.width, scale * self.norm)
+        shift = np.where(clearance, 0.0, (factor - 1.0) * self.threshold)
+        scale = np.where(clearance & (self.up + self.width <= CROSSED), factor, 1.0)
+        return Cells(scale * self.up + shift, scale * self.down - shift, scale * self.width, scale * self.norm)
 
     def means(self, history: History, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
         """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
