@@ -130,7 +130,7 @@ class Verdict:
     def save(self, folder: Path | str, figures: bool = True) -> Path:
         """Write verdict.json and its figures, as the verb ``accept`` does; BadInput beside a fit of other data."""
         refuse_company(Path(folder), self.result)
-        return _save(self.result, "verdict.json", "save_verdict_figures", folder, figures)
+        return _save(self.result, "verdict.json", folder, figures)
 
     def __str__(self):
         return f"{self.result['unit']}: {line(self.result['outcome'])}"
@@ -159,7 +159,7 @@ class Comparison:
 
     def save(self, folder: Path | str, figures: bool = True) -> Path:
         """Write comparison.json and its figures, as the verb ``compare`` does."""
-        return _save(self.result, "comparison.json", "save_comparison_figures", folder, figures)
+        return _save(self.result, "comparison.json", folder, figures)
 
     def _repr_html_(self):
         out = _title("Comparison of " + ", ".join(self.result["names"]), f"ratios with {self.result['level']:.0%} intervals")
@@ -271,11 +271,11 @@ def _evidence(fitted, examined: bool = False) -> Evidence:
     return replace(found, diagnosis=diagnose(fitted).result) if examined else found
 
 
-def _save(result, name, figures_of, folder, figures):
+def _save(result, name, folder, figures):
     with write_folder(folder) as room:
         write_json(room / name, result)
         if figures:
-            draw_figures(figures_of, room)
+            draw_figures(name, room)
     return Path(folder)
 
 

@@ -76,7 +76,7 @@ def run(args) -> int:
         write_json(folder / "verdict.json", verdict)
         keep_run(folder, "accept", began)
         if not args.no_figures:
-            draw_figures("save_verdict_figures", folder)
+            draw_figures("verdict.json", folder)
     _summarise(verdict, evidence.about, out)
     return verdict["outcome"]["exit_code"]
 

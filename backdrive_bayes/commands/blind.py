@@ -11,9 +11,9 @@ from pathlib import Path
 from backdrive_bayes.blind.seal import UNITS
 from backdrive_bayes.commands.output import say, write_json
 from backdrive_bayes.commands.progress import progress
-from backdrive_bayes.commands.results import keep_run, stamped
+from backdrive_bayes.commands.results import draw_figures, keep_run, stamped
 from backdrive_bayes.decisions.outcome import line
-from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.errors import BadInput
 
 HELP = "make units with a withheld effect, diagnose them without the key, then open the key and score"
 NAME = "blind.json"
@@ -51,7 +51,7 @@ def run(args) -> int:
     stamped(result, {"unit": "blind", "data_sha256": _data_sha256(out)}, args.seed, result["request"])
     write_json(out / NAME, result)
     if not args.no_figures:
-        _draw(out)
+        draw_figures("blind.json", out)
     keep_run(out, "blind", began)
     _summarise(result, out)
     return result["outcome"]["exit_code"]
@@ -82,15 +82,6 @@ def _count(option, value, units):
     if not 0 <= value <= units:
         raise BadInput(option, "a number from 0 to that of the units", value)
     return value
-
-
-def _draw(out: Path) -> None:
-    try:
-        from backdrive_bayes.figures.blind import save_blind
-    except MissingExtra as missing:
-        say(f"no figures: {missing}")
-    else:
-        save_blind(out, out / "figures")
 
 
 def _summarise(result: dict, out: Path) -> None:

@@ -62,7 +62,7 @@ def run(args) -> int:
         write_json(folder / "comparison.json", result)
         keep_run(folder, "compare", began)
         if not args.no_figures:
-            draw_figures("save_comparison_figures", folder)
+            draw_figures("comparison.json", folder)
     _summarise(result, out)
     return result["outcome"]["exit_code"]
 

@@ -58,7 +58,7 @@ def run(args) -> int:
             keep_fit(posterior, indicators, folder, figures=False)
             retire(out, sampled[1])
         if not args.no_figures:
-            draw_figures("save_figures", folder)
+            draw_figures("diagnosis.json", folder)
     _summarise(result, sampled, out)
     return result["outcome"]["exit_code"]
 

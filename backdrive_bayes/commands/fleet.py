@@ -10,9 +10,9 @@ from pathlib import Path
 
 from backdrive_bayes.commands.output import default_out, say, write_json
 from backdrive_bayes.commands.progress import progress
-from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, keep_run
+from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, draw_figures, keep_run
 from backdrive_bayes.decisions.outcome import line, outcome_of
-from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.errors import BadInput
 
 HELP = "fit (and diagnose and judge) every unit below a folder, on all cores or a cluster; run again, it goes on where it stood"
 NAME = "fleet.json"
@@ -63,7 +63,7 @@ def run(args) -> int:
         write_json(out / NAME, result)
         keep_run(out, "fleet", began)
         if not args.no_figures:
-            _draw(out)
+            draw_figures("fleet.json", out)
         pools = _pools(args, job, units, found, client)
     _summarise(result, tally, out)
     show_pools(pools)
@@ -113,15 +113,6 @@ def _client(args, cluster):
     if args.workers is not None and not 1 <= args.workers <= 1024:
         raise BadInput("--workers", "a number from 1 to 1024", args.workers)
     return cluster.local(args.workers or os.cpu_count() or 1)
-
-
-def _draw(out: Path) -> None:
-    try:
-        from backdrive_bayes.figures.fleet import save_fleet
-    except MissingExtra as missing:
-        say(f"no figures: {missing}")
-    else:
-        save_fleet(out, out / "figures")
 
 
 def _summarise(result: dict, tally, out: Path) -> None:

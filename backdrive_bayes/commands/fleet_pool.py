@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from backdrive_bayes.commands.output import say, write_folder, write_json
-from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.commands.results import draw_figures
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.fleet import cluster
 from backdrive_bayes.fleet.store import DONE, posterior_folder
 from backdrive_bayes.fleet.summary import batch_of
@@ -48,7 +49,7 @@ def pool_fleet(job: Job, units: list[FleetUnit], found: list, client, level: flo
         with write_folder(folder) as room:
             write_json(room / "pool.json", pool)
             if figures:
-                _draw(room)
+                draw_figures("pool.json", room)
         written.append(folder)
     return written
 
@@ -78,15 +79,6 @@ def _pooled(job: Job, batch: str, members: list[FleetUnit], client, level: float
     pool["left_out"] += sorted(lost, key=lambda row: row["unit"])
     pool |= {"version": job.version, "options": job.options}
     return pool | {"outcome": outcome_of(pool).to_json()}
-
-
-def _draw(folder: Path) -> None:
-    try:
-        from backdrive_bayes.figures.pool import save_pool
-    except MissingExtra as missing:
-        say(f"no figures: {missing}")
-    else:
-        save_pool(folder, folder / "figures")
 
 
 def show_pools(folders: list[Path]) -> None:

@@ -156,7 +156,7 @@ def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=l
     write_json(folder / "indicators.json", result | {"posterior_sha256": digest})
     if figures:
         note("figures")
-        draw_figures("save_figures", folder)
+        draw_figures("indicators.json", folder)
 
 
 def keep_run(folder: Path, verb: str, began_s: float) -> None:
@@ -197,12 +197,12 @@ def refuse_company(out: Path, result: dict) -> None:
         require_same_data(path, read_result(path, INDICATORS), result)
 
 
-def draw_figures(function: str, folder: Path) -> None:
-    """Draw what ``folder`` holds into its figures/, or say which package is missing."""
+def draw_figures(file: str, folder: Path) -> None:
+    """Draw the figures of a result ``file`` in ``folder`` into its figures/, or say which package is missing."""
     try:
-        from backdrive_bayes.figures import catalogue
+        from backdrive_bayes.figures.catalogue import save_figures
 
-        getattr(catalogue, function)(folder, folder / "figures")
+        save_figures(folder, folder / "figures", file)
     except MissingExtra as missing:
         say(f"no figures: {missing}")
 

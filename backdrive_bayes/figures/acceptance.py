@@ -13,6 +13,8 @@ from backdrive_bayes.figures.style import (
     display_unit,
     drawn_words,
     few_ticks,
+    legend_below,
+    loop_words,
     new_figure,
     styled,
 )
@@ -39,11 +41,7 @@ def draw(verdict: dict, rows: list[int]):
             _panel(panel, verdict["limits"][row])
         for panel in axes[len(rows) :]:
             panel.set_visible(False)
-        named: dict = {}
-        for panel in axes[: len(rows)]:
-            for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
-                named.setdefault(name, handle)
-        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=5)
+        legend_below(figure, *axes[: len(rows)], columns=5)
     return figure
 
 
@@ -66,11 +64,9 @@ def _panel(panel, row):
     panel.set(xlim=(left, right), ylim=(0, 1.12), yticks=[], xlabel=f"{drawn_words(row['indicator'])} [{unit or '–'}]")
     colour = {"accepted": GREEN, "rejected": VERMILLION}.get(row["verdict"], BLACK)
     predicted = ", predicted" if row["predicted"] else ""
-    at = f"{row['loading_rate_Nm_per_s']:.2g} N·m/s, ±{row['amplitude_Nm']:.2g} N·m{predicted}"
-    panel.set_title(f"{at}: {row['verdict']}", color=colour)
+    panel.set_title(f"{loop_words(row)}{predicted}: {row['verdict']}", color=colour)
     panel.spines["left"].set_visible(False)
-    few_ticks(panel, 4)
-    panel.set_yticks([])
+    few_ticks(panel, 4, None)
 
 
 def _mark_classic(panel, value, left, right):

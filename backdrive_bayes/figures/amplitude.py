@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import MJ_PER_J, SERIES, few_ticks, new_figure, record_labels, styled
+from backdrive_bayes.figures.style import MJ_PER_J, SERIES, few_ticks, legend_below, new_figure, record_labels, styled
 
 CAPTION = (
     "Energy S(t) dissipated in a loop of amplitude t and dissipation ratio u(t) = S/W_abs: median and "
@@ -19,10 +19,8 @@ def draw(saved: Saved, records: list[int]):
     with styled():
         figure = new_figure(2.35)
         axes = figure.subplots(1, 2)
-        labels = record_labels(saved.records)
-        draw_panels(axes, saved, records, labels)
-        handles, names = axes[0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncols=min(3, len(names)))
+        draw_panels(axes, saved, records, record_labels(saved.records))
+        legend_below(figure, axes[0], columns=3)
     return figure
 
 
@@ -38,21 +36,10 @@ def draw_panels(axes, saved: Saved, records: list[int], labels: list[str]) -> No
 
 def _series(panel, record, key, factor, label, place, count):
     amplitude = np.asarray(record["by_amplitude"]["amplitude_Nm"])
-    median, lo, hi = (
-        factor * np.array([v[k] if v else np.nan for v in record["by_amplitude"][key]])
-        for k in ("median", "lo", "hi")
-    )
+    values = record["by_amplitude"][key]
+    median, lo, hi = (factor * np.array([v[k] if v else np.nan for v in values]) for k in ("median", "lo", "hi"))
     # A small sideways step keeps the bars of several records apart.
     aside = (place - 0.5 * (count - 1)) * 0.12 * (amplitude[0] if amplitude.size else 0.0)
     error = np.maximum([median - lo, hi - median], 0.0)
     look = SERIES[place % len(SERIES)]
-    panel.errorbar(
-        amplitude + aside,
-        median,
-        error,
-        **look,
-        label=label,
-        capsize=2,
-        markersize=4,
-        markerfacecolor="white",
-    )
+    panel.errorbar(amplitude + aside, median, error, **look, label=label, capsize=2, markersize=4, markerfacecolor="white")

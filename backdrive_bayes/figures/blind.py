@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from backdrive_bayes.figures.catalogue import save_each
-from backdrive_bayes.figures.style import BLUE, GREY, SERIES, Figure, new_figure, styled, words
-from backdrive_bayes.results import BLIND, read_result
+from backdrive_bayes.figures.style import BLUE, GREY, SERIES, Figure, legend_below, new_figure, styled, words
 
 CAPTIONS = {
     "confusion": "True effects (rows) and answers of the diagnosis (columns), in units; shade is the share of the row.",
@@ -23,11 +19,6 @@ def blind_figures(result: dict) -> dict[str, Figure]:
     draw = {"confusion": _confusion, "power": _power, "reliability": _reliability, "sets": _sets}
     with styled():
         return {name: draw[name](result) for name in CAPTIONS}
-
-
-def save_blind(folder: Path, out: Path) -> list[Path]:
-    """Write the figures of ``folder``/blind.json into ``out`` as .svg and .png."""
-    return save_each(blind_figures(read_result(Path(folder) / "blind.json", BLIND)), out)
 
 
 def _confusion(result):
@@ -67,7 +58,7 @@ def _power(result):
     _severities(axes, rows, "named")
     axes.set_ylabel("share of units")
     axes.set_ylim(-0.03, 1.03)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    legend_below(figure, axes, columns=3)
     return figure
 
 

@@ -9,12 +9,15 @@ from pathlib import Path
 from backdrive_bayes.figures import (
     acceptance,
     amplitude,
+    blind,
     comparison,
     corner_plot,
     diagnosis,
     energy,
+    fleet,
     loop,
     modules,
+    pool,
     predictive,
     torque_energy,
     trace,
@@ -22,8 +25,8 @@ from backdrive_bayes.figures import (
 from backdrive_bayes.figures.diagnosis_saved import FILE as DIAGNOSIS
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import PER_FIGURE, SERIES, Figure, parts, styled
-from backdrive_bayes.results import COMPARISON, VERDICT, read_result
+from backdrive_bayes.figures.style import PER_FIGURE, PNG_DPI, SERIES, Figure, numbered, styled
+from backdrive_bayes.results import BLIND, COMPARISON, FLEET, POOL, VERDICT, read_result
 
 CAPTIONS = {
     "loop": loop.CAPTION,
@@ -41,7 +44,6 @@ CAPTIONS = {
     "comparison-ratios": comparison.RATIOS,
     "comparison-mechanism": comparison.MECHANISM,
 }
-PNG_DPI = 150
 
 
 def caption(name: str, level: float | None = None) -> str:
@@ -63,62 +65,55 @@ def all_figures(folder: Path) -> dict[str, Figure]:
 def figures_of(saved: Saved, wanted=lambda name: True) -> dict[str, Figure]:
     """The same from results already read, as far as ``wanted`` by name; those that need draws only where they were saved."""
     everything = list(range(len(saved.records)))
-    makers = _makers("loop", loop.draw, saved, everything, PER_FIGURE)
-    makers |= _makers("modules", modules.draw, saved, modules.distinct(saved), 1)
-    makers |= _makers("torque-energy", torque_energy.draw, saved, everything, PER_FIGURE)
-    makers |= _makers("amplitude", amplitude.draw, saved, everything, len(SERIES))
+    makers = numbered("loop", loop.draw, saved, everything, PER_FIGURE)
+    makers |= numbered("modules", modules.draw, saved, modules.distinct(saved), 1)
+    makers |= numbered("torque-energy", torque_energy.draw, saved, everything, PER_FIGURE)
+    makers |= numbered("amplitude", amplitude.draw, saved, everything, len(SERIES))
     makers["energy"] = partial(energy.draw, saved)
     if saved.posterior_file:
         shared = list(corner_plot.shared_parameters(saved))
-        makers |= _makers("corner", corner_plot.draw, saved, shared, corner_plot.in_one_figure(len(shared)))
+        makers |= numbered("corner", corner_plot.draw, saved, shared, corner_plot.in_one_figure(len(shared)))
         makers["trace"] = partial(trace.draw, saved)
-        makers |= _makers("predictive", predictive.draw, saved, everything, PER_FIGURE)
+        makers |= numbered("predictive", predictive.draw, saved, everything, PER_FIGURE)
     return {name: make() for name, make in makers.items() if wanted(name)}
 
 
 def verdict_figures(verdict: dict) -> dict[str, Figure]:
     """The figures of a verdict object: acceptance, acceptance-2, …"""
-    return _split("acceptance", acceptance.draw, verdict, list(range(len(verdict["limits"]))), acceptance.AT_MOST)
+    rows = list(range(len(verdict["limits"])))
+    return {name: make() for name, make in numbered("acceptance", acceptance.draw, verdict, rows, acceptance.AT_MOST).items()}
 
 
 def comparison_figures(result: dict) -> dict[str, Figure]:
     """The figures of a comparison object."""
     overlays = list(range(len(result["overlays"])))
-    out = _split("comparison-loops", comparison.draw_loops, result, overlays, PER_FIGURE)
-    out |= _split("comparison-energy", comparison.draw_energy, result, overlays, PER_FIGURE)
-    pairs = [i for i, p in enumerate(result["pairs"]) if p["conditions"]]
-    for n, i in enumerate(pairs, 1):
-        out["comparison-ratios" if n == 1 else f"comparison-ratios-{n}"] = comparison.draw_ratios(result, i)
-    return out | {"comparison-mechanism": comparison.draw_mechanism(result)}
+    makers = numbered("comparison-loops", comparison.draw_loops, result, overlays, PER_FIGURE)
+    makers |= numbered("comparison-energy", comparison.draw_energy, result, overlays, PER_FIGURE)
+    makers |= numbered("comparison-ratios", comparison.draw_ratios, result, comparison.with_ratios(result), 1)
+    makers["comparison-mechanism"] = partial(comparison.draw_mechanism, result)
+    return {name: make() for name, make in makers.items()}
 
 
-def _makers(name, draw, saved, records, at_most):
-    """Functions that draw the parts of a figure, by name."""
-    numbered = enumerate(parts(records, at_most))
-    return {name if i == 0 else f"{name}-{i + 1}": partial(draw, saved, part) for i, part in numbered}
+_OF_FILE = {
+    "verdict.json": (VERDICT, verdict_figures),
+    "comparison.json": (COMPARISON, comparison_figures),
+    "blind.json": (BLIND, blind.blind_figures),
+    "fleet.json": (FLEET, fleet.fleet_figures),
+    "pool.json": (POOL, pool.pool_figures),
+}
+"""Schema and figures of the result files besides those of fits and diagnoses."""
 
 
-def _split(name, draw, saved, records, at_most):
-    return {n: make() for n, make in _makers(name, draw, saved, records, at_most).items()}
+def save_figures(folder: Path, out: Path, file: str = "indicators.json") -> list[Path]:
+    """Write the figures of a result ``file`` in ``folder`` into ``out`` as .svg and .png; equal results give equal bytes.
 
-
-def save_figures(folder: Path, out: Path) -> list[Path]:
-    """Write every figure of ``folder`` into ``out`` as .svg and .png; equal results give equal bytes."""
-    return save_each(all_figures(folder), out)
-
-
-def save_verdict_figures(folder: Path, out: Path) -> list[Path]:
-    """The same for the verdict in ``folder``."""
-    return save_each(verdict_figures(read_result(Path(folder) / "verdict.json", VERDICT)), out)
-
-
-def save_comparison_figures(folder: Path, out: Path) -> list[Path]:
-    """The same for the comparison in ``folder``."""
-    return save_each(comparison_figures(read_result(Path(folder) / "comparison.json", COMPARISON)), out)
-
-
-def save_each(figures: dict[str, Figure], out: Path) -> list[Path]:
-    """Write figures by name into ``out`` as .svg and .png."""
+    Those of a fit and of its diagnosis are written together, whichever of the two files is named.
+    """
+    if file in _OF_FILE:
+        schema, draw = _OF_FILE[file]
+        figures = draw(read_result(Path(folder) / file, schema))
+    else:
+        figures = all_figures(folder)
     out.mkdir(parents=True, exist_ok=True)
     written = []
     for name, figure in figures.items():

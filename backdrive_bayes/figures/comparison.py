@@ -14,7 +14,10 @@ from backdrive_bayes.figures.style import (
     SKY,
     drawn_words,
     few_ticks,
+    legend_below,
+    loop_words,
     new_figure,
+    reach,
     styled,
 )
 
@@ -42,7 +45,7 @@ def draw_loops(comparison: dict, conditions: list[int]):
         for panel in axes:
             panel.set_xlabel("torque [N·m]")
         axes[0].set_ylabel("angle [arcmin]")
-        _legend(figure, axes[0])
+        legend_below(figure, axes[0], columns=4)
     return figure
 
 
@@ -53,7 +56,7 @@ def draw_energy(comparison: dict, conditions: list[int]):
         for panel in axes:
             panel.set(xlabel="|torque| [N·m]", xlim=(0, None), ylim=(0, None))
         axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
-        _legend(figure, axes[0])
+        legend_below(figure, axes[0], columns=4)
     return figure
 
 
@@ -67,16 +70,21 @@ def _overlaid(comparison, conditions, height, draw):
     return figure, axes
 
 
-def draw_ratios(comparison: dict, pair: int):
-    """Forest plot of one pair of units, one series a condition."""
-    both = comparison["pairs"][pair]
+def with_ratios(comparison: dict) -> list[int]:
+    """The pairs of units that were measured at a common rate and amplitude."""
+    return [i for i, pair in enumerate(comparison["pairs"]) if pair["conditions"]]
+
+
+def draw_ratios(comparison: dict, pairs: list[int]):
+    """Forest plot of the first of the given pairs of units, one series a condition."""
+    both = comparison["pairs"][pairs[0]]
     shown = [name for name in SHOWN if any((c["indicators"].get(name) or {}).get("ratio") for c in both["conditions"])]
     with styled():
         figure = new_figure(0.9 + 0.05 * len(shown) * max(3.0, len(both["conditions"])))
         panel = figure.subplots()
         step = 0.7 / max(1, len(both["conditions"]))
         for i, condition in enumerate(both["conditions"]):
-            look, label = SERIES[i % len(SERIES)], _condition(condition)
+            look, label = SERIES[i % len(SERIES)], loop_words(condition)
             for row, name in enumerate(shown):
                 ratio = (condition["indicators"].get(name) or {}).get("ratio")
                 if ratio:
@@ -90,7 +98,7 @@ def draw_ratios(comparison: dict, pair: int):
         panel.set_yticklabels([drawn_words(name) for name in shown])
         panel.set_xlabel(f"ratio: {_short(both['first'])} over {_short(both['second'])} [–]")
         _plain_log(panel)
-        figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        legend_below(figure, panel, columns=3)
     return figure
 
 
@@ -107,10 +115,9 @@ def draw_mechanism(comparison: dict):
             _bar(right, record["elastic_share"], row, 0.0, "given back", SKY, "")
         left.axvline(1.0, color="black", linewidth=0.7)
         left.set(xlim=(0, min(max(1.0, left.get_xlim()[1]), MOST_OF_S)), xlabel="share of S [–]", ylim=(len(bars) - 0.5, -0.5))
-        left.set_yticks(range(len(bars)), [f"{_short(name)}, {_condition(r)}" for name, r in bars])
+        left.set_yticks(range(len(bars)), [f"{_short(name)}, {loop_words(r)}" for name, r in bars])
         right.set(xlim=(0, 1), xlabel="given back/absorbed [–]")
-        handles = [*zip(*left.get_legend_handles_labels(), strict=True), *zip(*right.get_legend_handles_labels(), strict=True)]
-        figure.legend([h for h, _ in handles], [n for _, n in handles], loc="outside lower center", ncols=3)
+        legend_below(figure, left, right, columns=3)
     return figure
 
 
@@ -120,14 +127,14 @@ def _bar(panel, interval, row, begin, name, colour, hatch) -> float:
         return 0.0
     length, label = interval["median"], name if row == 0 else None
     panel.barh(row, length, left=begin, height=0.66, label=label, color=colour, hatch=hatch, edgecolor="white", linewidth=0)
-    panel.errorbar(begin + length, row, xerr=_reach(interval), color="black", capsize=2, linewidth=0.8)
+    panel.errorbar(begin + length, row, xerr=reach(interval), color="black", capsize=2, linewidth=0.8)
     return length
 
 
 def _panels(figure, comparison, conditions):
     axes = figure.subplots(1, len(conditions), sharey=True, squeeze=False)[0]
     for panel, condition in zip(axes, conditions, strict=True):
-        panel.set_title(_condition(comparison["overlays"][condition]))
+        panel.set_title(loop_words(comparison["overlays"][condition]))
         few_ticks(panel, {1: 10, 2: 6, 3: 4}[len(conditions)])
     return axes
 
@@ -156,19 +163,11 @@ def _one_energy(panel, record, look, name):
     panel.plot(curve["torque_Nm"], median, color=look["color"], linestyle=look["linestyle"], label=name)
 
 
-def _legend(figure, panel):
-    figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-
-
 def _whisker(panel, interval, at, look, name):
     panel.errorbar(
-        interval["median"], at, xerr=_reach(interval), color=look["color"], marker=look["marker"], linestyle="none", label=name,
+        interval["median"], at, xerr=reach(interval), color=look["color"], marker=look["marker"], linestyle="none", label=name,
         markersize=4, markerfacecolor="white", capsize=2,
     )  # fmt: skip
-
-
-def _reach(interval):
-    return [[max(interval["median"] - interval["lo"], 0.0)], [max(interval["hi"] - interval["median"], 0.0)]]
 
 
 def _plain_log(panel):
@@ -181,10 +180,6 @@ def _plain_log(panel):
     ticks = [t for t in ticks if low <= t <= high]
     panel.set_xticks(ticks, [f"{t:g}" for t in ticks])
     panel.minorticks_off()
-
-
-def _condition(at) -> str:
-    return f"{at['loading_rate_Nm_per_s']:.2g} N·m/s, ±{at['amplitude_Nm']:.2g} N·m"
 
 
 def _short(name: str, most: int = 24) -> str:

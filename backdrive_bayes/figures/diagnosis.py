@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import textwrap
+from functools import partial
 from typing import Any
 
-from backdrive_bayes.figures import diagnosis_closed, diagnosis_map, diagnosis_residual, diagnosis_shift
+from backdrive_bayes.figures import diagnosis_closed, diagnosis_map, diagnosis_residual, diagnosis_shift, diagnosis_simulated
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_which import bar_lines, draw_bars
 from backdrive_bayes.figures.diagnosis_words import answer_words, drawable
-from backdrive_bayes.figures.style import PER_FIGURE, Figure, new_figure, parts, styled
+from backdrive_bayes.figures.style import PER_FIGURE, PNG_DPI, Figure, new_figure, numbered, styled
 
 CAPTION = (
     "The diagnosis at a glance. Left: probability of each cause. Right: rms of the gap on held-out data before "
-    "and after the effect is added, and the fraction closed. Beneath: where the baseline misses the measurement "
-    "(+: measured angle larger than modelled); with many records, those that hold most of the gap."
+    "and after the effect is added, and the fraction closed. Beneath: where the baseline (or the simulator) misses "
+    "the measurement (+: measured angle larger than modelled); with many records, those that hold most of the gap."
 )
 CAPTIONS = {
     "diagnosis": CAPTION,
@@ -22,8 +23,8 @@ CAPTIONS = {
     "gap-residual": diagnosis_residual.CAPTION,
     "closed-fraction": diagnosis_closed.CAPTION,
     "parameter-shift": diagnosis_shift.CAPTION,
+    "simulator": diagnosis_simulated.CAPTION,
 }
-FINE_DPI = 150
 ROW_IN = (0.19, 0.14)
 """Height of a row of the map at a glance and of a stripe in it, at least [inch]."""
 MAP_IN = 2.6
@@ -34,37 +35,33 @@ _LINE = 104
 def figures_of(saved: Diagnosed) -> dict[str, Figure]:
     """Every figure that the saved parts allow, by name."""
     everything = list(range(len(saved.records)))
-    out = {"diagnosis": draw(saved)} if saved.result["which"] or saved.cells else {}
+    makers = {"diagnosis": partial(draw, saved)} if saved.result["which"] or saved.cells else {}
     if saved.cells:
         row_in = diagnosis_map.row_height_in(saved, *diagnosis_map.ROW_IN)
-        at_most = diagnosis_map.fitting(diagnosis_map.MAP_IN, row_in)
-        out |= _split("gap-map", diagnosis_map, saved, everything, at_most)
-    out |= _split("gap-residual", diagnosis_residual, saved, sorted(diagnosis_residual.by_record(saved)), PER_FIGURE)
+        makers |= numbered("gap-map", diagnosis_map.draw, saved, everything, diagnosis_map.fitting(diagnosis_map.MAP_IN, row_in))
+    residual = sorted(diagnosis_residual.by_record(saved))
+    makers |= numbered("gap-residual", diagnosis_residual.draw, saved, residual, PER_FIGURE)
     if saved.shrink:
-        out |= _split("closed-fraction", diagnosis_closed, saved, everything, diagnosis_closed.AT_MOST)
+        makers |= numbered("closed-fraction", diagnosis_closed.draw, saved, everything, diagnosis_closed.AT_MOST)
     if saved.shifts:
-        out["parameter-shift"] = diagnosis_shift.draw(saved)
-    for figure in out.values():
-        _settle(figure)
-    return out
+        makers["parameter-shift"] = partial(diagnosis_shift.draw, saved)
+    if saved.simulator.get("told") and not saved.inconclusive:
+        makers["simulator"] = partial(diagnosis_simulated.draw, saved)
+    return {name: _settled(make()) for name, make in makers.items()}
 
 
-def _settle(figure):
+def _settled(figure):
     """Fix the layout; the solver's last bits vary from run to run, and the files would show it."""
     with styled():
         # Letters are a little wider at some resolutions: room for them as they are printed.
-        figure.set_dpi(FINE_DPI)
+        figure.set_dpi(PNG_DPI)
         figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for part in figure.subfigs:
         part.bbox_relative.set_points(part.bbox_relative.get_points().round(5))
     for axes in figure.axes:
         axes.set_position([round(x, 5) for x in axes.get_position().bounds])
-
-
-def _split(name, kind, saved, records, at_most):
-    """Figures of nearly equal numbers of records."""
-    return {name if i == 0 else f"{name}-{i + 1}": kind.draw(saved, part) for i, part in enumerate(parts(records, at_most))}
+    return figure
 
 
 def draw(saved: Diagnosed):
@@ -113,14 +110,8 @@ def _closed(part, axes, saved, records):
     diagnosis_closed.draw_before_after(axes, saved, records)
     if saved.effects == ["unknown"]:
         axes.set_title("How far with the best?", loc="left", fontweight="bold")
-    part.legend(
-        handles=diagnosis_closed.before_after_handles(),
-        loc="outside lower right",
-        ncols=3,
-        handletextpad=0.4,
-        columnspacing=1.2,
-        borderaxespad=0.1,
-    )
+    tight = {"handletextpad": 0.4, "columnspacing": 1.2, "borderaxespad": 0.1}
+    part.legend(handles=diagnosis_closed.before_after_handles(), loc="outside lower right", ncols=3, **tight)
 
 
 def _where(axes, saved, records, row_in):

@@ -82,10 +82,9 @@ def draw(saved: Diagnosed, records: list[int]):
         if control:
             axes.axhline(len(shown) - 0.5, color="black", linewidth=0.6)
             _interval(axes, len(shown), control, ORANGE, "s")
-        _names(axes, [name for name, _ in shown] + ["Gaussian process (control)"] * bool(control))
         axes.axvline(100, color="black", linewidth=0.7, linestyle=(0, (4, 2)))
         axes.set_xlim(min(0, max(FAR, axes.get_xlim()[0])), 103)
-        few_ticks(axes, 10, 100)
+        few_ticks(axes, 10, None)
         _names(axes, [name for name, _ in shown] + ["Gaussian process (control)"] * bool(control))
         axes.set_xlabel("closed fraction of the gap [%]; dashed: down to the noise")
     return figure

@@ -75,10 +75,9 @@ def draw_map(axes, saved: Diagnosed, records: list[int], row_in: float, numbers:
         number = saved.numbers[cell["record"]]
         box = _box(cell, scales[number], _top(records, number), every)
         _cell(axes, cell, box, norm(cell["signed_rms_rad"] * factor), (span, row_in, numbers))
-    _rows(axes, saved, records)
     axes.axvline(0, color="black", linewidth=0.7)
     axes.set_xlim(-1.01 * span, 1.01 * span)
-    few_ticks(axes, 8, 30)
+    few_ticks(axes, 8, None)
     _rows(axes, saved, records)
     axes.set_xlabel(f"{axis}; loading runs away from zero, unloading back to zero")
     if sure:

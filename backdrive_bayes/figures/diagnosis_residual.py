@@ -5,15 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, FALLING, GREY, RISING, few_ticks, new_figure, styled
+from backdrive_bayes.figures.style import (
+    ARCMIN_PER_RAD,
+    FALLING,
+    GREY,
+    RISING,
+    TORQUE_TICKS,
+    few_ticks,
+    legend_below,
+    new_figure,
+    styled,
+)
 
 CAPTION = (
-    "Measured minus modelled angle along the loop, before (baseline alone) and after the chosen effect is added; little that is "
-    "left is shown once more on its own scale."
+    "Measured minus modelled angle along the loop, before (baseline alone, or the simulator as it is) and after the chosen "
+    "effect is added; little that is left is shown once more on its own scale."
 )
 ZOOM = 3.0
 """Where the residual shrinks by this factor, what is left gets a row with a scale of its own."""
-_STEPS = {1: 10, 2: 6, 3: 5}
 
 
 def draw(saved: Diagnosed, records: list[int]):
@@ -36,10 +45,9 @@ def draw(saved: Diagnosed, records: list[int]):
         if len(rows) > 1:
             axes[1, 0].set_ylim(axes[0, 0].get_ylim())
         for panel in axes.ravel():
-            few_ticks(panel, _STEPS[len(records)], 5)
+            few_ticks(panel, TORQUE_TICKS[len(records)], 5)
         figure.align_ylabels(axes[:, 0])
-        handles, names = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncols=3, markerscale=1.8)
+        legend_below(figure, axes[0, 0], columns=3, markerscale=1.8)
     return figure
 
 
@@ -64,16 +72,7 @@ def _residual(axes, entry, key):
     noise = entry["noise_rad"] * ARCMIN_PER_RAD
     axes.axhspan(-noise, noise, color=GREY, alpha=0.35, linewidth=0, label="noise, ±1 standard deviation")
     axes.axhline(0, color="black", linewidth=0.6)
-    for sign, look, marker, name in ((1, RISING, "^", "rising torque"), (-1, FALLING, "o", "falling torque")):
+    look = {"linestyle": "none", "markersize": 2.6, "markerfacecolor": "none", "markeredgewidth": 0.6}
+    for sign, line, marker, name in ((1, RISING, "^", "rising torque"), (-1, FALLING, "o", "falling torque")):
         own = direction == sign
-        axes.plot(
-            torque[own],
-            angle[own],
-            linestyle="none",
-            marker=marker,
-            markersize=2.6,
-            markerfacecolor="none",
-            markeredgewidth=0.6,
-            color=look["color"],
-            label=name,
-        )
+        axes.plot(torque[own], angle[own], marker=marker, color=line["color"], label=name, **look)

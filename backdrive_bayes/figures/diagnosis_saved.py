@@ -102,9 +102,15 @@ class Diagnosed:
         return in_words(str(self.where.get("summary") or ""))
 
     @property
+    def simulator(self) -> dict:
+        """What a simulator was found to lack; empty where none was set against the unit."""
+        return self.result.get("simulator") or {}
+
+    @property
     def enlarged(self) -> bool:
-        """Whether there is something after to set beside before: an effect was added, and the result may be used."""
-        return bool(self.effects) and not self.inconclusive
+        """Whether there is something after to set beside before: an effect was added or a simulator re-tuned, and the result
+        may be used."""
+        return bool(self.effects or self.simulator.get("told")) and not self.inconclusive
 
     @property
     def shrink(self) -> dict:
@@ -113,14 +119,15 @@ class Diagnosed:
 
     @property
     def added(self) -> bool:
-        """Whether an effect was added to the model: an unknown cause alone adds none, and closes nothing by itself."""
+        """Whether an effect was added to the model, or a simulator re-tuned: an unknown cause alone adds none, and closes nothing
+        by itself."""
         closed = self.shrink.get("closed_fraction") or {}
         return bool(self.shrink) and (self.effects != ["unknown"] or any(closed.get(end) for end in ("lo", "hi")))
 
     @property
     def shifts(self) -> list[dict]:
         """Shifts of the baseline's parameters, largest first; empty where nothing was added to the model."""
-        found = (self.result.get("parameter_shift") or []) if self.enlarged else []
+        found = (self.result.get("parameter_shift") or []) if self.enlarged and self.effects else []
         return sorted(found, key=lambda s: -abs(s["shift_sd"] or 0.0))
 
     @property

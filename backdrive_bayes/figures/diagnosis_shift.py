@@ -6,7 +6,7 @@ from statistics import NormalDist
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import FAR, drawable, parameter_words, signed
-from backdrive_bayes.figures.style import BLUE, VERMILLION, few_ticks, new_figure, styled
+from backdrive_bayes.figures.style import BLUE, VERMILLION, few_ticks, legend_below, new_figure, styled
 
 CAPTION = (
     "Shift of the baseline's parameters when the effect is added, in each parameter's own standard deviations "
@@ -36,9 +36,7 @@ def draw(saved: Diagnosed):
         axes.set_ylim(len(shown) - 0.4, -0.6)
         axes.tick_params(axis="y", length=0)
         axes.set_xlabel(f"shift [own standard deviations{kind}]; figures at the right: shift of the median")
-        handles, names = axes.get_legend_handles_labels()
-        once = dict(zip(names, handles, strict=True))
-        figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=3)
+        legend_below(figure, axes, columns=3)
     return figure
 
 
@@ -69,7 +67,7 @@ def _one(axes, y, shift, scale):
 def _scale(axes, far):
     """Ticks and limits; returns what the axis' name says of its scale."""
     axes.axvline(0, color="black", linewidth=0.6)
-    few_ticks(axes, 10, 100)
+    few_ticks(axes, 10, None)
     if far > WIDE:
         axes.set_xscale("symlog", linthresh=3, linscale=1)
         steps = [3, 10, 30, 100] if far <= 150 else [10, 100, 1000]

@@ -84,6 +84,8 @@ def answer_words(saved: Diagnosed) -> str:
     """The answer in one phrase."""
     if saved.inconclusive:
         return "Inconclusive: no effect is named"
+    if not saved.effects and saved.simulator.get("told"):
+        return f"Nothing is missing in the simulator, re-tuning will do{_probability(saved, 'none')}"
     if not saved.effects:
         return f"No gap: the baseline explains the data{_probability(saved, 'none')}"
     if saved.effects == ["unknown"]:
@@ -91,7 +93,8 @@ def answer_words(saved: Diagnosed) -> str:
     named = effect_words("+".join(saved.effects))
     found = saved.answered()
     chances = f" ({chance(found[0]['probability'])})" if len(found) == 1 else ""
-    return named[:1].upper() + named[1:] + chances
+    lead = "Missing in the simulator: " if saved.simulator else ""
+    return (lead + named)[:1].upper() + (lead + named)[1:] + chances
 
 
 def more_words(saved: Diagnosed) -> str:

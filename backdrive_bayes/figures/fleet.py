@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from matplotlib.ticker import MaxNLocator
 
-from backdrive_bayes.figures.catalogue import save_each
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -16,13 +13,13 @@ from backdrive_bayes.figures.style import (
     display_unit,
     drawn_words,
     few_ticks,
+    legend_below,
     new_figure,
     styled,
     two_lines,
     words,
 )
 from backdrive_bayes.number_text import probability_text
-from backdrive_bayes.results import FLEET, read_result
 
 CAPTIONS = {
     "fleet-charts": "Control charts, one point a unit, with its interval in small fleets: centre (line), three sigma from moving "
@@ -56,11 +53,6 @@ def fleet_figures(result: dict) -> dict[str, Figure]:
         if result["verdicts"] or result["effects"]:
             found["fleet-shares"] = _shares(result)
     return found
-
-
-def save_fleet(folder: Path, out: Path) -> list[Path]:
-    """Write the figures of ``folder``/fleet.json into ``out`` as .svg and .png."""
-    return save_each(fleet_figures(read_result(Path(folder) / "fleet.json", FLEET)), out)
 
 
 def _charts(result):
@@ -129,7 +121,7 @@ def _distributions(result):
         few_ticks(axes)
     figure.axes[0].set_ylabel("units")
     if batches:
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        legend_below(figure, figure.axes[0], columns=4)
     return figure
 
 

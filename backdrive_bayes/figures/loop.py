@@ -9,7 +9,9 @@ from backdrive_bayes.figures.style import (
     FIRST,
     GREY,
     RISING,
+    TORQUE_TICKS,
     few_ticks,
+    legend_below,
     new_figure,
     record_labels,
     styled,
@@ -20,7 +22,6 @@ CAPTION = (
     "median and interval. Beneath: measured minus predicted angle; grey bars span the interval of "
     "replicated data."
 )
-_STEPS = {1: 10, 2: 6, 3: 5}
 
 
 def draw(saved: Saved, records: list[int]):
@@ -28,23 +29,20 @@ def draw(saved: Saved, records: list[int]):
     with styled():
         figure = new_figure(3.35)
         ratios = [3, 1.15] if saved.posterior_file else [1]
-        axes = figure.subplots(
-            len(ratios), len(records), sharex="col", sharey="row", squeeze=False, height_ratios=ratios
-        )
+        axes = figure.subplots(len(ratios), len(records), sharex="col", sharey="row", squeeze=False, height_ratios=ratios)
         labels = record_labels(saved.records)
         for column, record in enumerate(records):
             _loop(axes[0, column], saved, record)
             axes[0, column].set_title(labels[record])
             axes[-1, column].set_xlabel("torque [N·m]")
-            few_ticks(axes[0, column], _STEPS[len(records)])
+            few_ticks(axes[0, column], TORQUE_TICKS[len(records)])
             if saved.posterior_file:
-                few_ticks(axes[1, column], _STEPS[len(records)], 4)
+                few_ticks(axes[1, column], TORQUE_TICKS[len(records)], 4)
                 _residual(axes[1, column], saved, record)
                 axes[1, 0].set_ylabel("residual\n[arcmin]")
         axes[0, 0].set_ylabel("angle [arcmin]")
         figure.align_ylabels(axes[:, 0])
-        handles, names = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncols=3, markerscale=1.8)
+        legend_below(figure, axes[0, 0], columns=3, markerscale=1.8)
     return figure
 
 
@@ -65,17 +63,11 @@ def _loop(axes, saved, record):
         blocks = record_blocks(saved, record)
         for name, mask, colour, marker in _kinds(blocks):
             if mask.any():
-                _points(
-                    axes, blocks.torque_nm[mask], blocks.angle_rad[mask], colour, marker, f"measured, {name}"
-                )
+                _points(axes, blocks.torque_nm[mask], blocks.angle_rad[mask], colour, marker, f"measured, {name}")
     for key, look, name in (("rising_rad", RISING, "rising"), ("falling_rad", FALLING, "falling")):
         band = {k: [v * ARCMIN_PER_RAD for v in values] for k, values in loop[key].items()}
-        axes.fill_between(
-            loop["torque_Nm"], band["lo"], band["hi"], color=look["color"], alpha=0.3, linewidth=0
-        )
-        axes.plot(
-            loop["torque_Nm"], band["median"], **look, label=f"settled loop, {name} ({100 * level:.3g} %)"
-        )
+        axes.fill_between(loop["torque_Nm"], band["lo"], band["hi"], color=look["color"], alpha=0.3, linewidth=0)
+        axes.plot(loop["torque_Nm"], band["median"], **look, label=f"settled loop, {name} ({100 * level:.3g} %)")
 
 
 def _residual(axes, saved, record):
@@ -88,14 +80,5 @@ def _residual(axes, saved, record):
 
 
 def _points(axes, torque, angle_rad, colour, marker, label):
-    axes.plot(
-        torque,
-        angle_rad * ARCMIN_PER_RAD,
-        linestyle="none",
-        marker=marker,
-        markersize=2.4,
-        markerfacecolor="none",
-        markeredgewidth=0.5,
-        color=colour,
-        label=label,
-    )
+    look = {"linestyle": "none", "markersize": 2.4, "markerfacecolor": "none", "markeredgewidth": 0.5}
+    axes.plot(torque, angle_rad * ARCMIN_PER_RAD, marker=marker, color=colour, label=label, **look)

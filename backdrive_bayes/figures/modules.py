@@ -10,6 +10,7 @@ from backdrive_bayes.figures.style import (
     FALLING,
     RISING,
     few_ticks,
+    legend_below,
     new_figure,
     record_labels,
     styled,
@@ -40,23 +41,17 @@ def distinct(saved: Saved) -> list[int]:
 
 
 def _alike(a, b):
-    if a["modules"].keys() != b["modules"].keys() or len(a["loop"]["torque_Nm"]) != len(
-        b["loop"]["torque_Nm"]
-    ):
+    if a["modules"].keys() != b["modules"].keys() or len(a["loop"]["torque_Nm"]) != len(b["loop"]["torque_Nm"]):
         return False
     pairs = [(a["loop"]["torque_Nm"], b["loop"]["torque_Nm"])]
-    pairs += [
-        (a["modules"][m][k], b["modules"][m][k]) for m in a["modules"] for k in ("rising_rad", "falling_rad")
-    ]
+    pairs += [(a["modules"][m][k], b["modules"][m][k]) for m in a["modules"] for k in ("rising_rad", "falling_rad")]
     top = max(np.abs(a["loop"]["rising_rad"]["median"]))
     scales = [max(np.abs(a["loop"]["torque_Nm"])), *[top] * (len(pairs) - 1)]
     return all(np.abs(np.subtract(x, y)).max() < ALIKE * s for (x, y), s in zip(pairs, scales, strict=True))
 
 
 def draw(saved: Saved, records: list[int]):
-    """Panels for the loop, each module and the effects of the first of ``records``, angle [arcmin] over
-    torque [N·m].
-    """
+    """Panels for the loop, each module and the effects of the first of ``records``, angle [arcmin] over torque [N·m]."""
     record = saved.records[records[0]]
     curves = _curves(record)
     rows = -(-len(curves) // COLUMNS)
@@ -79,9 +74,7 @@ def draw(saved: Saved, records: list[int]):
 
 def _curves(record):
     loop = [np.asarray(record["loop"][k]["median"]) for k in ("rising_rad", "falling_rad")]
-    modules = {
-        m: [np.asarray(c[k]) for k in ("rising_rad", "falling_rad")] for m, c in record["modules"].items()
-    }
+    modules = {m: [np.asarray(c[k]) for k in ("rising_rad", "falling_rad")] for m, c in record["modules"].items()}
     rest = [whole - sum(parts[i] for parts in modules.values()) for i, whole in enumerate(loop)]
     seen = max(np.ptp(r) for r in rest) >= VISIBLE * max(np.ptp(b) for b in loop)
     effects = [("effects", *rest)] if seen else []
@@ -104,8 +97,7 @@ def _label(figure, axes, used):
             panel.set_axis_off()
         elif i % COLUMNS == 0:
             panel.set_ylabel("angle [arcmin]")
-    handles, names = axes[0].get_legend_handles_labels()
     if used < len(axes):
-        axes[-1].legend(handles, names, loc="center")
+        axes[-1].legend(*axes[0].get_legend_handles_labels(), loc="center")
     else:
-        figure.legend(handles, names, loc="outside lower center", ncols=2)
+        legend_below(figure, axes[0], columns=2)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from backdrive_bayes.figures.catalogue import save_each
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -13,13 +10,13 @@ from backdrive_bayes.figures.style import (
     Figure,
     drawn_words,
     few_ticks,
+    legend_below,
     new_figure,
     shown_unit,
     styled,
     two_lines,
 )
 from backdrive_bayes.number_text import level_text
-from backdrive_bayes.results import POOL, read_result
 
 CAPTIONS = {
     "pool-units": "Units of the batch in order of the first indicator, with {level} intervals: each by itself (grey) and with "
@@ -44,11 +41,6 @@ def pool_figures(result: dict) -> dict[str, Figure]:
         chosen, spreads = shown_quantities(result), [q for q in result["quantities"] if not q["refused"] and q["scale"] == "log"]
         found = {"pool-units": _units(chosen)} if chosen else {}
         return found | ({"pool-spread": _spreads(spreads)} if spreads else {})
-
-
-def save_pool(folder: Path, out: Path) -> list[Path]:
-    """Write the figures of ``folder``/pool.json into ``out`` as .svg and .png."""
-    return save_each(pool_figures(read_result(Path(folder) / "pool.json", POOL)), out)
 
 
 def shown_quantities(result: dict) -> list[dict]:
@@ -84,16 +76,8 @@ def _units(chosen):
     first.set_yticks(range(len(order)), [_short(name) for name in order])
     first.tick_params(axis="y", length=0, labelsize=7)
     first.set_ylim(len(order) - 0.4, -0.6)
-    figure.legend(*_entries(figure.axes), loc="outside lower center", ncols=5)
+    legend_below(figure, *figure.axes, columns=5)
     return figure
-
-
-def _entries(all_axes):
-    named = {}
-    for axes in all_axes:
-        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
-            named.setdefault(name, handle)
-    return named.values(), named.keys()
 
 
 def _panel(axes, quantity, order):
@@ -117,13 +101,7 @@ def _panel(axes, quantity, order):
     axes.set_xlabel(two_lines(drawn_words(quantity["name"]), f"[{unit or '–'}]"))
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0)
-    axes.xaxis.set_major_locator(_ticks())
-
-
-def _ticks():
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
+    few_ticks(axes, 4, None)
 
 
 def _short(name):
@@ -140,8 +118,7 @@ def _spreads(quantities):
         axes.plot(100 * spread["median"], y, marker="o", markersize=3.5, color=ORANGE, markeredgecolor=BLUE)
     axes.set_yticks(range(len(quantities)), [quantity_words(q, loops) for q in quantities])
     axes.set_ylim(len(quantities) - 0.4, -0.6)
-    few_ticks(axes, 8)
-    axes.set_yticks(range(len(quantities)), [quantity_words(q, loops) for q in quantities])
+    few_ticks(axes, 8, None)
     axes.set_xlim(left=0)
     axes.set_xlabel("spread of the units [%]")
     return figure

@@ -11,6 +11,7 @@ from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
     few_ticks,
+    legend_below,
     new_figure,
     record_labels,
     styled,
@@ -25,7 +26,6 @@ CAPTION = (
     "replicate has fresh noise. Ranks then crowd in the middle (the curve falls, then rises) and the line lies "
     "left of the histogram: cautious. The opposite means model discrepancy."
 )
-POINTS = 101
 
 
 def draw(saved: Saved, records: list[int]):
@@ -45,26 +45,18 @@ def draw(saved: Saved, records: list[int]):
         axes[-1, 0].set_xlabel("rank among replicates")
         axes[-1, 1].set_xlabel("angle range [arcmin]")
         axes[-1, 2].set_xlabel("rms step [arcmin]")
-        _legend(figure, axes[0])
+        legend_below(figure, *axes[0, :2], columns=4)
     return figure
-
-
-def _legend(figure, axes):
-    pairs = [p for a in axes[:2] for p in zip(*a.get_legend_handles_labels(), strict=True)]
-    handles, names = zip(*pairs, strict=True)
-    figure.legend(handles, names, loc="outside lower center", ncols=4)
 
 
 def _ecdf(panel, blocks, level):
     """Empirical distribution of ranks minus the even one, for the measured record and for every replicate."""
     replicates = np.sort(blocks.replicates_rad, axis=0)
-    grid = np.linspace(0, 1, POINTS)
+    grid = np.linspace(0, 1, 101)
     measured = _curve(_rank(replicates, blocks.angle_rad), grid)
     band = np.array([_curve(_rank(replicates, r), grid) for r in blocks.replicates_rad])
     lo, hi = np.quantile(band, [0.5 - level / 2, 0.5 + level / 2], axis=0)
-    panel.fill_between(
-        grid, lo, hi, color=GREY, alpha=0.4, linewidth=0, label=f"ranks of replicates, {100 * level:.3g} %"
-    )
+    panel.fill_between(grid, lo, hi, color=GREY, alpha=0.4, linewidth=0, label=f"ranks of replicates, {100 * level:.3g} %")
     panel.plot(grid, measured, color=BLUE, label="ranks of measured")
     panel.axhline(0, color=BLACK, linewidth=0.6)
     panel.set_xlim(0, 1)
@@ -86,14 +78,8 @@ def _roughness(angle, blocks):
 
 
 def _summary(panel, replicated, measured):
-    panel.hist(
-        replicated * ARCMIN_PER_RAD,
-        bins=20,
-        color="#C9C9C9",
-        edgecolor="#7A7A7A",
-        linewidth=0.4,
-        label="replicates",
-    )
+    look = {"color": "#C9C9C9", "edgecolor": "#7A7A7A", "linewidth": 0.4}
+    panel.hist(replicated * ARCMIN_PER_RAD, bins=20, label="replicates", **look)
     panel.axvline(measured * ARCMIN_PER_RAD, color=BLUE, linewidth=1.6, label="measured record")
     few_ticks(panel, 3)
     panel.set_ylabel("count")

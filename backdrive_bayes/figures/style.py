@@ -7,6 +7,7 @@ import re
 import textwrap
 import warnings
 from contextlib import contextmanager
+from functools import partial
 
 from backdrive_bayes.errors import MissingExtra
 
@@ -22,14 +23,15 @@ except ImportError:
     raise MissingExtra("drawing figures", "matplotlib", "figures") from None
 
 WIDTH_IN = 170 / 25.4
-"""Width of every figure: the text width of an A4 page with 20 mm margins, so that font sizes print as they
-are set.
-"""
+"""Width of every figure: the text width of an A4 page with 20 mm margins, so that font sizes print as they are set."""
 
+PNG_DPI = 150
 ARCMIN_PER_RAD = 180 * 60 / math.pi
 MJ_PER_J = 1e3
 PER_FIGURE = 3
 """Records side by side in one figure; more records make more figures."""
+TORQUE_TICKS = {1: 10, 2: 6, 3: 5}
+"""Steps on the torque axes of so many panels side by side."""
 
 BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#007A5A"
 PURPLE, ORANGE, SKY, GREY = "#A3527F", "#E69F00", "#56B4E9", "#8C8C8C"
@@ -88,19 +90,42 @@ def new_figure(height_in: float, constrained: bool = True) -> Figure:
     return figure
 
 
-def few_ticks(axes, x: int = 4, y: int = 5) -> None:
-    """At most ``x`` and ``y`` steps between round tick labels."""
-    axes.xaxis.set_major_locator(MaxNLocator(x, steps=[1, 2, 2.5, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(y, steps=[1, 2, 2.5, 5, 10]))
+def few_ticks(axes, x: int = 4, y: int | None = 5) -> None:
+    """At most ``x`` and ``y`` steps between round tick labels; None leaves that axis as it is."""
+    for axis, most in ((axes.xaxis, x), (axes.yaxis, y)):
+        if most is not None:
+            axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
+
+
+def legend_below(figure: Figure, *axes, columns: int, **look) -> None:
+    """One legend beneath the figure for everything that has a name in some axes, each name once."""
+    named: dict = {}
+    for panel in axes:
+        for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
+            named.setdefault(name, handle)
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=min(columns, len(named)), **look)
+
+
+def numbered(name: str, draw, saved, items: list, at_most: int) -> dict[str, partial]:
+    """Functions that draw the parts of a figure by name (loop, loop-2, …), of nearly equal numbers of items."""
+    return {name if i == 0 else f"{name}-{i + 1}": partial(draw, saved, part) for i, part in enumerate(parts(items, at_most))}
+
+
+def loop_words(at: dict) -> str:
+    """Loading rate and amplitude of a record object, or of anything else that has them."""
+    return f"{at['loading_rate_Nm_per_s']:.2g} N·m/s, ±{at['amplitude_Nm']:.2g} N·m"
+
+
+def reach(interval: dict) -> list[list[float]]:
+    """How far an interval goes from its median to either side, as error bars want it."""
+    return [[max(interval["median"] - interval["lo"], 0.0)], [max(interval["hi"] - interval["median"], 0.0)]]
 
 
 def record_labels(records) -> list[str]:
-    """A short, unique name for each record object: its rate, with the amplitude or a number where rates
-    repeat.
-    """
+    """A short, unique name for each record object: its rate, with the amplitude or a number where rates repeat."""
     labels = [f"{r['loading_rate_Nm_per_s']:.2g} N·m/s" for r in records]
     if len(set(labels)) < len(labels):
-        labels = [f"{a}, ±{r['amplitude_Nm']:.2g} N·m" for a, r in zip(labels, records, strict=True)]
+        labels = [loop_words(r) for r in records]
     if len(set(labels)) < len(labels):
         labels = [f"{a} (no. {i})" for i, a in enumerate(labels, 1)]
     return labels

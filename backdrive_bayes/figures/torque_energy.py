@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import BLACK, BLUE, MJ_PER_J, few_ticks, new_figure, record_labels, styled
+from backdrive_bayes.figures.style import BLACK, BLUE, MJ_PER_J, few_ticks, legend_below, new_figure, record_labels, styled
 
 CAPTION = (
     "Torque–energy curve: energy dissipated per unit of torque, median and interval, with the ranges W1 "
@@ -29,8 +29,7 @@ def draw(saved: Saved, records: list[int]):
             panel.set_title(f"{labels[record]}\nτ₁ {tau1:.2g}, τ₂ {tau2:.2g} N·m")
             panel.set_xlabel("low |torque| [N·m]" if enlarged else "|torque| [N·m]")
         axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
-        handles, names = axes[0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+        legend_below(figure, axes[0], columns=9)
     return figure
 
 
@@ -55,9 +54,7 @@ def _curve(axes, saved, record, zoomed):
     lo, hi, median = (np.asarray(curve[k]) * MJ_PER_J for k in ("lo", "hi", "median_J_per_Nm"))
     edges = (0.0, tau1, tau2, end)
     for (name, colour, hatch), a, b in zip(SHADES, edges, edges[1:], strict=False):
-        axes.axvspan(
-            a, b, facecolor=colour, hatch=hatch, edgecolor="white", linewidth=0, alpha=0.8, label=name
-        )
+        axes.axvspan(a, b, facecolor=colour, hatch=hatch, edgecolor="white", linewidth=0, alpha=0.8, label=name)
     band = f"{100 * saved.indicators['level']:.3g} % interval"
     axes.fill_between(torque, lo, hi, color=BLUE, alpha=0.4, linewidth=0, label=band)
     axes.plot(torque, median, color=BLUE, label="median")

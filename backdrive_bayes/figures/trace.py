@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import SERIES, few_ticks, new_figure, styled, words, wrapped
+from backdrive_bayes.figures.style import SERIES, few_ticks, legend_below, new_figure, styled, words, wrapped
 
 CAPTION = (
     "Sampling. Natural logarithms of the scales of the class's weights, and log of their marginal posterior density, over the "
@@ -42,8 +42,7 @@ def draw(saved: Saved):
             panel.tick_params(labelbottom=last)
             if last:
                 panel.set_xlabel("kept draw")
-        handles, names = panel.get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside lower center", ncols=min(6, len(names)), markerscale=2.5)
+        legend_below(figure, panel, columns=6, markerscale=2.5)
     return figure
 
 

@@ -9,6 +9,7 @@ from backdrive_bayes.figures.catalogue import caption
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import label_words
 from backdrive_bayes.figures.style import words
+from backdrive_bayes.report import diagnosis_simulated as simulated
 from backdrive_bayes.report import diagnosis_tables as tables
 from backdrive_bayes.report.blocks import Banner, Block, Chapter, Facts, Heading, Picture, Signature
 from backdrive_bayes.report.diagnosis_text import TERMS, next_test, outcome, verdict
@@ -38,6 +39,7 @@ def chapter(folder: Path) -> Chapter:
         ],
         [*(Picture(*about, spilt=True) for about in overview), *_details(saved, figures)],
         figures,
+        pages=simulated.pages(saved, [Picture(n, caption(n, saved.level)) for n in figures if n == "simulator"]),
         outcome=", ".join(filter(None, [outcome(saved), warned(saved.result)])),
         terms=[Heading("Diagnosis"), Facts(TERMS)] if saved.result["which"] else [],
         provisional=not usable(saved.result),
@@ -47,6 +49,7 @@ def chapter(folder: Path) -> Chapter:
 def _identity(saved):
     rows = [
         ("Baseline", free(" + ".join(words(m) for m in saved.result.get("baseline") or []) or "not recorded")),
+        *([("Simulator", free(saved.simulator.get("unit") or "not named", 80))] if saved.simulator else []),
         ("Records", _record_list(saved)),
         ("Gap", tables.gap_text(saved)),
         ("90 % credible set", free(", ".join(label_words(e) for e in saved.credible_set) or "not given")),

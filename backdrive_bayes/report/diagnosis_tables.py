@@ -34,6 +34,8 @@ def gap_text(saved: Diagnosed) -> str:
     if not gap:
         return "not judged"
     size = f"rms {_arcmin(gap.get('rms_rad'))} arcmin, noise floor {_arcmin(gap.get('noise_floor_rad'))} arcmin"
+    if saved.simulator:
+        return f"probability {probability_text(gap.get('probability'))}; measured minus simulated angle on held-out data: {size}"
     return f"probability {probability_text(gap.get('probability'))}; fitted to all records, its smooth part: {size}"
 
 
@@ -88,8 +90,9 @@ def shrink(saved: Diagnosed) -> list:
     if control:
         lines.append(["Gaussian process (control)", "–", "–", "–", share_text(control)])
     columns = ["Held out", "before [arcmin]", "after [arcmin]", "noise floor [arcmin]", "closed fraction"]
+    stages = "of the simulator as it is, and re-tuned with what it lacks" if saved.simulator else "without and with the effect"
     note = Note(
-        "Rms of measured minus predicted angle on held-out data, without and with the effect. Closed fraction with its "
+        f"Rms of measured minus predicted angle on held-out data, {stages}. Closed fraction with its "
         f"{level_text(saved.level)} interval."
     )
     return [Table(columns, lines, [1.5, 1, 1, 1.2, 1.3]), note]
@@ -108,9 +111,8 @@ def indicators(saved: Diagnosed) -> list:
         return []
     at = saved.shrink.get("indicators_at")
     where = f" at {at['loading_rate_Nm_per_s']:.3g} N·m/s and ±{at['amplitude_Nm']:.3g} N·m" if at else ""
-    note = Note(
-        f"Median [{level_text(saved.level)} interval] of the reducer{where}, without and with the effect in the model."
-    )
+    stages = "in simulator and unit" if saved.simulator else "without and with the effect in the model"
+    note = Note(f"Median [{level_text(saved.level)} interval] of the reducer{where}, {stages}.")
     return [Table(["Indicator", "Unit", "Before", "After", "Change"], lines, [1.6, 0.6, 1.3, 1.3, 0.7]), note]
 
 

@@ -32,6 +32,8 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
         text = Free(f"Reason: {reason}. Do not name a cause from this result.")
         return "bad", f"{saved.result['outcome']['word'].upper()}: no effect is named", text
     where = free(saved.summary, 400)
+    if saved.simulator:
+        return _against_simulator(saved, where)
     if not saved.effects:
         return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))
     rivals = _rivals(saved)
@@ -40,6 +42,17 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
     if saved.effects == ["unknown"]:
         return "caution", "GAP OF UNKNOWN CAUSE", text
     return "caution", f"{found}, {_standing(saved, rivals)}", text
+
+
+def _against_simulator(saved, where):
+    text = Free(_join(answer_words(saved), free(in_words(saved.simulator.get("summary", "")), 300), where, _rivals(saved)))
+    if not saved.simulator.get("told"):
+        return "good", "NO GAP TO THE SIMULATOR", text
+    if not saved.effects:
+        return "caution", "GAP TO THE SIMULATOR, CLOSED BY RE-TUNING", text
+    if saved.effects == ["unknown"]:
+        return "caution", "GAP TO THE SIMULATOR, OF UNKNOWN CAUSE IN PART", text
+    return "caution", f"GAP TO THE SIMULATOR, {_standing(saved, _rivals(saved))}", text
 
 
 def outcome(saved: Diagnosed) -> str:

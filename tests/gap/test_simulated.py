@@ -1,0 +1,131 @@
+"""A simulator set against a unit: the gap is split, what is missing is named, what agrees is said to agree."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.planted import HERTZ, LOOPS, planted, smooth_reducer
+
+from backdrive_bayes.bench.known_truth import ramp
+from backdrive_bayes.engine.reduced import reduce_unit
+from backdrive_bayes.errors import BadInput
+from backdrive_bayes.gap.diagnose import diagnose
+from backdrive_bayes.gap.simulated import compared, lacking, summary
+from backdrive_bayes.gap.simulator import read_simulator, through_bench
+from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise
+from backdrive_bayes.records.record import Record, Unit
+
+OFFSET_NM = 8e-4
+
+
+def simulated(loops=LOOPS, hertz=HERTZ, offset_nm=0.0, **factors) -> Unit:
+    """A noise-free simulator of the smooth reducer with parts scaled by ``factors``."""
+    known = smooth_reducer()
+    known = replace(known, weights={n: w * factors.get(n, 1.0) for n, w in known.weights.items()})
+    records = []
+    for amplitude, rate in loops:
+        time, torque = ramp(amplitude, rate, hertz)
+        angle = known.angle_rad(time, torque)
+        records.append(Record(f"{amplitude}-{rate}.csv", time, torque - offset_nm, angle, rate, amplitude))
+    return Unit("simulator", 0.1, tuple(records))
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """A unit with a torque offset, diagnosed."""
+    return diagnose(planted(known=smooth_reducer(), offset_nm=OFFSET_NM), seed=2)
+
+
+@pytest.fixture(scope="module")
+def against(measured):
+    """Sets the unit against a simulator."""
+
+    def set_against(unit):
+        return compared(measured, read_simulator(unit, measured.weighed.linear.reduced, 2), 2, 0.03).json
+
+    return set_against
+
+
+@pytest.fixture(scope="module")
+def shifted(against):
+    """The simulator has too little clearance, is too soft and lacks the offset."""
+    return against(simulated(clearance=0.9, elastic=1.1))
+
+
+def test_what_the_simulator_lacks_is_named(shifted):
+    assert shifted["answer"]["effects"] == ["torque_offset"]
+    assert sum(row["probability"] for row in shifted["which"]) == pytest.approx(1.0)
+    assert shifted["simulator"]["effects"] == [] and shifted["simulator"]["told"]
+    assert shifted["gap"]["probability"] > 0.95
+
+
+def test_the_shares_are_whole_and_the_gap_closes(shifted):
+    split = shifted["simulator"]
+    shares = [split[key] for key in ("closed_by_retuning", "closed_by_effect", "left")]
+    assert sum(share["median"] for share in shares) == pytest.approx(1.0)
+    assert all(share["lo"] <= share["median"] <= share["hi"] for share in shares)
+    assert shares[0]["median"] > 0.8 and shares[1]["hi"] > 0.0 and split["closed_by_both"]["lo"] > 0.9
+    rms = split["rms_rad"]
+    assert rms["simulated"] > 5 * rms["retuned"] > 0 and rms["explained"] <= 1.05 * rms["retuned"]
+    assert shifted["shrink"]["before_rad"] == rms["simulated"] and shifted["shrink"]["after_rad"] == rms["explained"]
+    assert [part["part"] for part in split["parts"]] == ["retuning", "effect", "left"]
+    for part in split["parts"]:
+        assert sum(cell["share"] for cell in part["map"]) == pytest.approx(1.0)
+
+
+def test_parameters_go_from_the_simulator_s_to_the_unit_s(shifted):
+    rows = {row["name"]: row for row in shifted["simulator"]["parameters"]}
+    clearance = rows["clearance_rad"]
+    true = 0.9 * 0.02
+    assert clearance["simulated_interval"]["lo"] < 0.9 * true < clearance["simulated_interval"]["hi"]
+    assert clearance["measured"]["lo"] < true < clearance["measured"]["hi"]
+    assert clearance["change"]["lo"] < 0.1 * true < clearance["change"]["hi"]
+
+
+def test_a_simulator_that_has_the_effect_and_agrees_lacks_nothing(against):
+    found = against(simulated(offset_nm=OFFSET_NM))
+    split = found["simulator"]
+    assert split["effects"] == split["shared_effects"] == ["torque_offset"] and found["answer"]["effects"] == []
+    assert not split["told"] and split["closed_by_retuning"]["median"] is None
+    assert "agree within the noise" in split["summary"] and split["rms_rad"]["simulated"] < 1.2 * split["rms_rad"]["noise_floor"]
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    return reduce_unit(planted(known=smooth_reducer(), offset_nm=OFFSET_NM))
+
+
+def test_noise_free_records_are_read_with_the_bench_s_noise(reduced):
+    given = simulated(hertz=60.0)
+    read, added = through_bench(given, reduce_unit(given), reduced, np.random.default_rng(0))
+    channels = [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, find_segments(r.time_s, r.torque_nm)) for r in read.records]
+    noise, bench = estimate_common_noise(channels)[0], reduced.noise[0]
+    assert noise.correlated_rad == pytest.approx(bench.correlated_rad, rel=0.2)
+    assert noise.torque_nm == pytest.approx(bench.torque_nm, rel=0.2)
+    assert added.white_rad <= bench.white_rad and np.isfinite([*vars(added).values()]).all()
+    noisy = replace(given, records=tuple(replace(r, angle_rad=r.angle_rad + _noise(r, 1e-3)) for r in given.records))
+    assert through_bench(noisy, reduce_unit(noisy), reduced, np.random.default_rng(0))[1].white_rad == 0.0
+
+
+def _noise(record, sd):
+    return sd * np.random.default_rng(5).standard_normal(record.time_s.size)
+
+
+def test_torques_beyond_the_simulated_ones_are_refused(reduced):
+    with pytest.raises(BadInput, match="torques up to 0.1"):
+        read_simulator(simulated(loops=((0.08, 0.05),)), reduced, 0)
+
+
+def test_lacking_is_what_the_unit_alone_has():
+    found = lacking({"a+b": 0.6, "unknown": 0.3, "none": 0.1}, {"b": 0.5, "unknown": 0.5})
+    assert found == pytest.approx({"a": 0.3, "a+b": 0.3, "unknown": 0.3, "none": 0.1})
+    assert lacking({"a": 1.0}, {"a": 0.9, "none": 0.1}) == pytest.approx({"none": 0.9, "a": 0.1, "unknown": 0.0})
+
+
+def test_the_sentence_abstains_with_the_result():
+    shares = {part: {"median": 0.5} for part in ("retuning", "effect", "left")}
+    assert "creep a further 50%" in summary(shares, True, "", ("creep",))
+    assert "no effect is missing" in summary(shares, True, "", ())
+    assert "Inconclusive" in summary(shares, True, "not converged", ("creep",))
+    assert "agree within the noise" in summary(shares, False, "", ())
