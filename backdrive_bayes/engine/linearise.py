@@ -47,7 +47,7 @@ BENDING = {
     "rate_dependent_friction": ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend"),
 }
 """Effects whose columns are derivatives, and the places of their parameters in a distortion."""
-BENT = 1.0
+BENT = 2.0
 """Torque, in its noise, by which a distortion moves the prediction no longer along a straight line."""
 MOST_BENT = 2
 WIDE = 2.0
@@ -191,7 +191,7 @@ class _Search:
     effects: tuple[Effect, ...]
     modules: tuple[str, ...]
     fixed: tuple[Group, ...]
-    only: tuple[str, ...] | None = None
+    bending: tuple[str, ...] = tuple(BENDING)
 
     def run(self, distortion: Distortion, steps: int, refine: bool = False) -> Linear:
         reduced, context = self.reduced, self.reduced.context
@@ -250,7 +250,7 @@ class _Search:
     def _solve(self, reducer, design, angles, covariances, start):
         priors = class_priors(reducer)
         for effect in self.effects:
-            free = effect is not BENCH_HYSTERESIS and (self.only is None or effect.name in self._acting)
+            free = effect is not BENCH_HYSTERESIS and effect.name not in self._held
             level = effect.present(self.reduced.context) if free else effect.trace(self.reduced.context)
             priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
@@ -269,9 +269,9 @@ class _Search:
         return data, *max(found, key=lambda f: f[0])[1:]
 
     @property
-    def _acting(self) -> set[str]:
-        """Terms of the effects that alone may act."""
-        return {t.name for n in self.only or () for t in all_effects().get(n, ())}
+    def _held(self) -> set[str]:
+        """Terms of the bending effects that may not act, and stay at trace level."""
+        return {t.name for n in BENDING if n not in self.bending for t in all_effects()[n]}
 
     def _moved(self, linear):
         weights = linear.weights

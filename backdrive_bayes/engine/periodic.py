@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,13 @@ def wave_group(linear: Linear, frequency: float | np.ndarray) -> Group:
         waves = np.stack([np.sin(phase).mean(axis=1), np.cos(phase).mean(axis=1)], axis=-1)
         columns.append(waves.reshape(blocks.count.size, -1))
     return Group("encoder_error", tuple(columns))
+
+
+def with_wave(linear: Linear, frequency: float) -> Linear:
+    """The linear model with a wave of the angle's reading beside."""
+    design = linear.design.joined(replace(wave_group(linear, frequency), name=WAVE))
+    scales = linear.log_scale | {WAVE: float(np.log(AMPLITUDE))}
+    return replace(linear, design=design, data=linear.whitened(design), log_scale=scales)
 
 
 def clearest_wave(linear: Linear) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import Distortion
 
 LEVELS = np.linspace(-0.9, 0.9, 73)
-TORQUES = np.linspace(-0.97, 0.97, 389)
+TORQUES = np.linspace(-0.97, 0.97, 1941)
 SHIFTS = np.linspace(-0.4, 0.4, 401)
 FINE = np.linspace(-0.002, 0.002, 41)
 """Torques at which legs are compared, and offsets that are tried, roughly and finely, in shares of the torque scale."""

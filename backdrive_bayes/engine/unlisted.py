@@ -1,5 +1,5 @@
-"""What something unlisted may look like beside a process on each leg: a module that changes in time, a step in time, legs of the two
-directions that differ anywhere in the torque."""
+"""What something unlisted may look like beside a process on each leg: a module that changes in time, a step in time, legs of
+the two directions that differ anywhere in the torque."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.infer import infer, prepare
 from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.one_thread import one_thread
-from backdrive_bayes.engine.periodic import AMPLITUDE, WAVE, wave_group
+from backdrive_bayes.engine.periodic import with_wave
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities
 from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, UNEXPLAINED, Weighed, weigh
@@ -65,19 +65,14 @@ def posterior_of(weighed: Weighed, effects: tuple[str, ...], seed: int, note=lam
 
 def with_columns(weighed: Weighed, effects: tuple[str, ...]) -> Linear:
     """The linear model with the columns of effects that it does not hold yet: an encoder's wave, what is unexplained."""
-    linear, groups, scales = weighed.of(effects), [], {}
+    linear = weighed.of(effects)
     if ENCODER in effects:
-        frequency = weighed.frequency.get(tuple(effects)) or next(f for h, f in weighed.frequency.items() if ENCODER in h)
-        groups.append(replace(wave_group(linear, frequency), name=WAVE))
-        scales[WAVE] = float(np.log(AMPLITUDE))
+        linear = with_wave(linear, weighed.frequency.get(weighed.nearest(effects), weighed.frequency[(ENCODER,)]))
     if UNEXPLAINED in effects or STICK_SLIP in effects:
-        groups.append(path_group(linear.reduced, UNKNOWN))
-        scales[UNKNOWN.name] = float(np.log(UNKNOWN.present(linear.reduced.context)))
-    if not groups:
-        return linear
-    design = linear.design.joined(*groups)
-    data = linear.whitened(design)
-    return replace(linear, design=design, data=data, log_scale=linear.log_scale | scales)
+        design = linear.design.joined(path_group(linear.reduced, UNKNOWN))
+        scales = linear.log_scale | {UNKNOWN.name: float(np.log(UNKNOWN.present(linear.reduced.context)))}
+        linear = replace(linear, design=design, data=linear.whitened(design), log_scale=scales)
+    return linear
 
 
 def mixed(drawn: list[tuple[Posterior, float]]) -> Posterior:

@@ -114,7 +114,7 @@ class _Found:
 
     @property
     def linear(self) -> Linear:
-        return self.weighed.linear
+        return self.weighed.of(())
 
     def finish(self, progress) -> Diagnosis:
         answers = self._labels()
@@ -123,7 +123,7 @@ class _Found:
         gap = where.estimate_gap(self.linear, self.rng)
         # A process of each leg's own fits what is held out by itself: something unknown closes nothing.
         before, after = self._fitted(()), self._fitted(tuple(e for e in effects if e != "unknown"))
-        shrunk = shrink(self.linear, before, after, gap.weight)
+        shrunk = shrink(before, after, gap.weight)
         closed = shrunk.closed("after", self.rng, LEVEL)
         if self._hollow(effects, closed):
             answers = _doubted(answers, likeliest)
@@ -178,13 +178,13 @@ class _Found:
     def _fitted(self, effects) -> Fitted:
         """A hypothesis in the linear model; what has no columns of its own stands for itself by those of the class."""
         linear = with_columns(self.weighed, effects)
-        design, priors = linear.design, levels(linear, tuple(effects))
+        priors = levels(linear, tuple(effects))
         for module in self.withheld:
             if module not in effects:
                 for part in linear.reducer.parts:
                     if part.module == module:
                         priors[part.name] = (-14.0, 0.0)
-        return fit_hypothesis(linear, effects, design, priors)
+        return fit_hypothesis(linear, effects, priors)
 
     def _hollow(self, effects, closed) -> bool:
         """Whether a name explains too little of held-out data to be one."""
@@ -243,13 +243,13 @@ class _Found:
         if len(usable) < 2 or usable[1][1] < 0.01:
             return None
         pair = tuple(self._fitted(() if n == "none" else tuple(n.split("+"))) for n, _ in usable)
-        return next_test.propose(self.linear, pair, (usable[0][1], usable[1][1]))
+        return next_test.propose(pair, (usable[0][1], usable[1][1]))
 
     def _residual(self, before, after):
-        rows, scale, linear = [], self.linear.reduced.angle_scale_rad, self.linear
-        curves = [f.design.predict(f.design.split(f.mean)) for f in (before, after)]
+        rows, linear = [], after.linear
+        scale, left = linear.reduced.angle_scale_rad, [f.residual for f in (before, after)]
         for r, blocks in enumerate(linear.reduced.blocks):
-            residuals = [(linear.angles[r] - c[r]) * scale for c in curves]
+            residuals = [x[r] * scale for x in left]
             rows.append({
                 "record": blocks.name, "torque_Nm": blocks.torque_nm.tolist(),
                 "direction": blocks.direction[blocks.leg].astype(int).tolist(),

@@ -9,13 +9,13 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from backdrive_bayes.engine.contrasts import SIZE_WEIGHTS, SIZES, Contrasts, averaged, make_contrasts
-from backdrive_bayes.engine.design import Group, path_group
+from backdrive_bayes.engine.contrasts import SIZE_WEIGHTS, SIZES, averaged, make_contrasts
+from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.marginal import find_scales
-from backdrive_bayes.engine.periodic import AMPLITUDE, FREQUENCIES, WAVE, wave_group
+from backdrive_bayes.engine.periodic import AMPLITUDE, FREQUENCIES, wave_group, with_wave
 from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
@@ -50,58 +50,61 @@ class Weighed:
 
     def of(self, effects: tuple[str, ...]) -> Linear:
         """The linear model about the mode where a hypothesis is most likely."""
-        return self.linears[self.mode.get(tuple(effects), 0)]
+        return self.linears[self.mode[self.nearest(effects)]]
+
+    def nearest(self, effects: tuple[str, ...]) -> tuple[str, ...]:
+        """The best weighed hypothesis with the most of these effects."""
+        return max((h for h in self.mode if set(h) <= set(effects)), key=lambda h: (len(h), self.log_factor[h]))
 
 
 def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
     """Weigh none, every effect and the pairs of the most promising about every mode; ``allowed`` restricts the names."""
     jumps = find_jumps(linears[0])
-    tables = []
-    for linear in linears:
-        bank = Group("bank", wave_group(linear, FREQUENCIES).columns)
-        contrasts = make_contrasts(linear, (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear), bank))
-        tables.append(_Table(linear, contrasts, jumps.log_factor > 0))
+    tables = [_Table(linear, jumps.log_factor > 0) for linear in linears]
     names = [n for n in (*tables[0].terms, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
-    leap = {n: jumps.log_factor if n == STICK_SLIP else 0.0 for n in names}
+    level = [_level(table, names) if len(tables) > 1 else 0.0 for table in tables]
 
-    def weighed(hypotheses, level):
-        logs = [[t.log_marginal(h) + sum(leap[n] for n in h) + lift for h in hypotheses] for t, lift in zip(tables, level, strict=True)]
-        return dict(zip(hypotheses, zip(np.max(logs, axis=0), np.argmax(logs, axis=0), strict=True), strict=True))
+    def best_mode(hypothesis):
+        leap = jumps.log_factor if STICK_SLIP in hypothesis else 0.0
+        found = [table.log_marginal(hypothesis) + leap + lift for table, lift in zip(tables, level, strict=True)]
+        return max(found), int(np.argmax(found))
 
-    level = [_level(linear, table, names) if len(linears) > 1 else 0.0 for linear, table in zip(linears, tables, strict=True)]
-    found = weighed([(), *((n,) for n in names)], level)
-    best = sorted(names, key=lambda n: -found[(n,)][0])[:PAIRED]
-    found |= weighed(list(itertools.combinations(sorted(best), 2)), level)
-    mode = {h: int(m) for h, (_, m) in found.items()}
-    log = {h: float(v - found[()][0]) for h, (v, _) in found.items()}
-    frequency = {h: tables[m].frequency[h] for h, m in mode.items() if h in tables[m].frequency}
-    left = {h: tables[m].left(h) for h, m in mode.items() if UNEXPLAINED not in h}
-    return Weighed(tuple(linears), mode, log, frequency, jumps, left, tables[0].contrasts.samples)
+    found = {h: best_mode(h) for h in [(), *((n,) for n in names)]}
+    promising = sorted(names, key=lambda n: -found[(n,)][0])[:PAIRED]
+    found |= {h: best_mode(h) for h in itertools.combinations(sorted(promising), 2)}
+    none = found[()][0]
+    return Weighed(
+        tuple(linears),
+        {h: mode for h, (_, mode) in found.items()},
+        {h: float(value - none) for h, (value, _) in found.items()},
+        {h: tables[mode].frequency[h] for h, (_, mode) in found.items() if ENCODER in h},
+        jumps,
+        {h: tables[mode].left(h) for h, (_, mode) in found.items() if UNEXPLAINED not in h},
+        tables[0].contrasts.samples,
+    )
 
 
-def _level(linear: Linear, table: _Table, names) -> float:
-    """What turns a table's log marginal likelihoods into those that compare between modes: that of its best single effect with the
-    scales of the class learnt, less the table's own."""
+def _level(table: _Table, names) -> float:
+    """What makes a table's log marginal likelihoods comparable between modes: that of its best single effect with the scales of
+    the class learnt, less the table's own."""
     singles = [(), *((n,) for n in names if n not in (UNEXPLAINED, STICK_SLIP))]
     log = {h: table.log_marginal(h) for h in singles}
     best = max(log, key=log.__getitem__)
-    own = linear
+    linear = with_wave(table.linear, table.frequency[best]) if ENCODER in best else table.linear
     scales = linear.design.scales(levels(linear, best))
-    if ENCODER in best:
-        wave = replace(wave_group(linear, table.frequency[best]), name=WAVE)
-        design = linear.design.joined(wave)
-        own = replace(linear, design=design, data=linear.whitened(design), log_scale=linear.log_scale | {WAVE: float(np.log(AMPLITUDE))})
-        scales = own.design.scales(levels(own, best))
-    start = np.where(scales.free, [own.log_scale[n] for n in own.design.names], scales.mean)
-    log_scale, solution = find_scales(own.data, scales, start)
-    return solution.log_marginal + own.data.log_volume + scales.log_prior(log_scale) - log[best]
+    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
+    log_scale, solution = find_scales(linear.data, scales, start)
+    return solution.log_marginal + linear.data.log_volume + scales.log_prior(log_scale) - log[best]
 
 
 class _Table:
     """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods."""
 
-    def __init__(self, linear: Linear, contrasts: Contrasts, jumps: bool):
-        self.contrasts, context = contrasts, linear.reduced.context
+    def __init__(self, linear: Linear, jumps: bool):
+        bank = replace(wave_group(linear, FREQUENCIES), name="bank")
+        unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
+        self.linear, self.contrasts = linear, make_contrasts(linear, (*unlisted, bank))
+        contrasts, context = self.contrasts, linear.reduced.context
         effects = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}
         self.names = contrasts.names
         self.trace = np.array([trace_of(linear, effects[n]) if n in effects else 0.0 for n in self.names])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.gap.shrink import Fitted
 from backdrive_bayes.mechanics.effect import FlankEffect, GrowthEffect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
@@ -17,11 +16,11 @@ AT_ODDS = 0.1
 """Noise of a prediction beside the measurement's: no formula is exact."""
 
 
-def propose(linear: Linear, pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> dict:
+def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> dict:
     """The contract's ``next_test`` for the two hypotheses that are still most probable."""
-    drops = {}
+    drops, linear = {}, pair[0].linear
     for text, (history, rate) in _tests(linear).items():
-        curves = [_predict(linear, f, history, rate) for f in pair]
+        curves = [_predict(f, history, rate) for f in pair]
         apart = curves[0] - curves[1]
         apart = apart - apart.mean()
         noise = linear.reduced.context.angle_noise
@@ -55,10 +54,10 @@ def _path(turning, rate, dwell_s=0.0) -> History:
     return through(time + dwell_s * np.r_[0, leg], torque, 1.0)
 
 
-def _predict(linear: Linear, fitted: Fitted, history: History, rate: float) -> np.ndarray:
+def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
     """Angle at the segments' ends that a hypothesis expects, in shares of the angle scale."""
-    weights = fitted.design.split(fitted.mean)
-    context = linear.reduced.context
+    linear = fitted.linear
+    weights, context = linear.design.split(fitted.mean), linear.reduced.context
     log_rate = float(np.log(rate) - np.log(context.rate).mean())
     growth = linear.distortion.growth(log_rate, context)
     base = linear.reducer.ends(history, growth)

@@ -20,8 +20,8 @@ def effect_parameters(weighed: Weighed, properties, posterior: Posterior, effect
         size = weighed.jumps.size_rad
         return {"jump": {"median": size, "lo": size, "hi": size, "unit": "rad"}}
     if effect == ENCODER:
-        period = next((1.0 / f for h, f in weighed.frequency.items() if effect in h), float("nan"))
-        period *= weighed.linear.reduced.angle_scale_rad
+        frequency = weighed.frequency.get(weighed.nearest(posterior.hypothesis), weighed.frequency[(ENCODER,)])
+        period = weighed.linear.reduced.angle_scale_rad / frequency
         return {"period": {"median": period, "lo": period, "hi": period, "unit": "rad"}}
     return _of_terms(weighed, posterior, effect, level)
 
@@ -36,7 +36,8 @@ def _of_terms(weighed, posterior, effect, level):
             factor = context.torque_scale_nm if term.unit == "N·m" else 1.0
             rows[term.parameter] = interval(weights[:, 0] * factor, level) | {"unit": term.unit}
         elif isinstance(term, PathEffect):
-            group = weighed.linear.design.groups[weighed.linear.design.names.index(term.name)]
+            design = weighed.of(posterior.hypothesis).design
+            group = design.groups[design.names.index(term.name)]
             columns = np.vstack([group.of_record(r) for r in range(len(group.columns))])
             columns = columns - columns.mean(axis=0)
             size = np.sqrt(np.mean((weights @ columns.T) ** 2, axis=1)) * context.angle_scale_rad

@@ -24,21 +24,26 @@ SMALLEST_GAP = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A hypothesis ready for prediction: its design, the scales of its weights at their mode, and its name."""
+    """A hypothesis ready for prediction: the linear model about its mode, scales and means of its weights, (weights,)."""
 
     effects: tuple[str, ...]
-    design: Design
+    linear: Linear
     scale: np.ndarray
     mean: np.ndarray
 
+    @property
+    def residual(self) -> list[np.ndarray]:
+        """What it leaves at the blocks of each record, in shares of the angle scale."""
+        curves = self.linear.design.predict(self.linear.design.split(self.mean))
+        return [a - c for a, c in zip(self.linear.angles, curves, strict=True)]
 
-def fit_hypothesis(linear: Linear, effects, design: Design, priors) -> Fitted:
+
+def fit_hypothesis(linear: Linear, effects, priors) -> Fitted:
     """Scales and weights of a hypothesis on all records."""
-    data = linear.whitened(design)
-    scales: Scales = design.scales(priors)
-    start = np.array([linear.log_scale.get(n, priors[n][0]) for n in design.names])
-    log_scale, solution = find_scales(data, scales, np.where(scales.free, start, scales.mean))
-    return Fitted(tuple(effects), design, scales.of_weights(log_scale), solution.mean)
+    scales: Scales = linear.design.scales(priors)
+    start = np.array([linear.log_scale.get(n, priors[n][0]) for n in linear.design.names])
+    log_scale, solution = find_scales(linear.data, scales, np.where(scales.free, start, scales.mean))
+    return Fitted(tuple(effects), linear, scales.of_weights(log_scale), solution.mean)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +99,9 @@ def about_first(values, level: float, pieces: int) -> dict:
     return {"median": middle, "lo": min(float(lo), middle), "hi": max(float(hi), middle)}
 
 
-def shrink(linear: Linear, before: Fitted, after: Fitted, weight) -> Shrink:
+def shrink(before: Fitted, after: Fitted, weight) -> Shrink:
     """Predict every fold from the others; ``weight`` holds the torque that each block spans, by record."""
+    linear = after.linear
     folds = _folds(linear)
     record = np.repeat(np.arange(len(linear.angles)), [a.size for a in linear.angles])
     torque = np.concatenate([b.torque_nm for b in linear.reduced.blocks])
@@ -105,8 +111,8 @@ def shrink(linear: Linear, before: Fitted, after: Fitted, weight) -> Shrink:
     columns = []
     for number, own in enumerate(folds.values()):
         share = span[own] / span[own].sum()
-        residuals = [_held_out(linear, f, own, record) * scale for f in (before, after)]
-        residuals.append(residuals[0] - _control(linear, before, own, record) * scale)
+        residuals = [_held_out(f, own, record) * scale for f in (before, after)]
+        residuals.append(residuals[0] - _control(before, own, record) * scale)
         place = np.floor(2 * torque[own] / np.abs(torque[own]).max()).astype(int)
         piece = np.unique(np.stack([leg[own], place]), axis=1, return_inverse=True)[1].ravel()
         parts = (share, *(share * (r - r @ share) ** 2 for r in residuals), share * variance[own])
@@ -129,16 +135,17 @@ def _folds(linear):
     return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in settled} if settled.size > 1 else {"all": np.arange(legs.size)}
 
 
-def _held_out(linear: Linear, fitted: Fitted, own, record) -> np.ndarray:
+def _held_out(fitted: Fitted, own, record) -> np.ndarray:
     """Residual (own blocks,) of what the rest predicts, what belongs to the held-out record alone fitted to it."""
-    columns, angle = np.vstack(fitted.design.records()), np.concatenate(linear.angles)
+    linear, design = fitted.linear, fitted.linear.design
+    columns, angle = np.vstack(design.records()), np.concatenate(linear.angles)
     rest = np.setdiff1d(np.arange(record.size), own)
     gone = np.setdiff1d(record[own], record[rest])
     weights = np.zeros(columns.shape[1])
     if rest.size:
         weights = _ridge(linear, columns, angle, rest, record, fitted.scale, np.ones(columns.shape[1], bool))
     if gone.size:
-        alone = _alone(fitted.design, int(gone[0]))
+        alone = _alone(design, int(gone[0]))
         left = angle - columns[:, ~alone] @ weights[~alone]
         weights[alone] = _ridge(linear, columns, left, own, record, fitted.scale, alone)[alone]
     return angle[own] - columns[own] @ weights
@@ -178,10 +185,9 @@ def _ridge(linear, columns, angle, rows, record, scale, used) -> np.ndarray:
     return weights
 
 
-def _control(linear, fitted, own, record) -> np.ndarray:
+def _control(fitted, own, record) -> np.ndarray:
     """What the mean residual of the other folds at the same leg and torque predicts: a smoother that names no cause."""
-    columns, angle = np.vstack(fitted.design.records()), np.concatenate(linear.angles)
-    residual = angle - columns @ fitted.mean
+    linear, residual = fitted.linear, np.concatenate(fitted.residual)
     torque = np.concatenate([b.torque_nm for b in linear.reduced.blocks]) / linear.reduced.torque_scale_nm
     direction = np.concatenate([b.direction[b.leg] for b in linear.reduced.blocks])
     trusted = np.concatenate(linear.reduced.trust) == 1.0

@@ -46,8 +46,8 @@ class Split:
 
     @property
     def linear(self) -> Linear:
-        """The unit's linear model."""
-        return self.weighed.linear
+        """The unit's linear model without any effect."""
+        return self.weighed.of(())
 
     @cached_property
     def gap(self) -> list[np.ndarray]:
@@ -72,10 +72,11 @@ class Split:
     @cached_property
     def held_out(self) -> dict[str, Shrink]:
         """Held-out squares by stage, each in the place of ``after`` with the simulator as it is in that of ``before``."""
-        tuned = shrink(self.linear, *self.fits, self.weight)
+        tuned = shrink(*self.fits, self.weight)
         group = min(self.linear.design.groups, key=lambda g: g.width)
-        nothing = Fitted((), Design((group,)), np.zeros(group.width), np.zeros(group.width))
-        bare = shrink(replace(self.linear, angles=tuple(self.gap)), nothing, nothing, self.weight).before
+        bare = replace(self.linear, angles=tuple(self.gap), design=Design((group,)))
+        nothing = Fitted((), bare, np.zeros(group.width), np.zeros(group.width))
+        bare = shrink(nothing, nothing, self.weight).before
         after = {"simulated": bare, "retuned": tuned.before, "explained": tuned.after}
         return {stage: replace(tuned, before=bare, after=values) for stage, values in after.items()}
 
@@ -105,9 +106,7 @@ class Split:
 
     def residuals(self) -> dict[str, list[np.ndarray]]:
         """What each stage, fitted to all records, leaves at the blocks of each record, in shares of the angle scale."""
-        # The linear model's angles hold what its tangents make of the distortion, and so do its curves.
-        curves = [f.design.predict(f.design.split(f.mean)) for f in self.fits]
-        tuned, explained = ([a - c for a, c in zip(self.linear.angles, curve, strict=True)] for curve in curves)
+        tuned, explained = (f.residual for f in self.fits)
         return {"simulated": self.gap, "retuned": tuned, "explained": explained}
 
     def parts(self, rng) -> dict[str, Gap]:
@@ -128,4 +127,4 @@ class Split:
 
 def _fitted(weighed: Weighed, effects: tuple[str, ...]) -> Fitted:
     linear = with_columns(weighed, effects)
-    return fit_hypothesis(linear, effects, linear.design, levels(linear, effects))
+    return fit_hypothesis(linear, effects, levels(linear, effects))

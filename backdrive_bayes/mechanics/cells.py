@@ -17,7 +17,7 @@ import numpy as np
 from backdrive_bayes.mechanics.history import History
 
 CROSSED = 0.7
-"""Torque, in shares of the largest, by which clearances are crossed: relays beyond stand for friction that the tip of a loop shows."""
+"""Torque, in shares of the largest, by which clearances are crossed: relays beyond stand for friction near the loop's tip."""
 START = ("neutral", "upper", "lower")
 """Initial states: demagnetised (a clearance in its middle), as after a large positive torque, as after a large negative one."""
 
@@ -55,8 +55,8 @@ class Cells:
         return np.isclose(self.up, -(self.down + self.width)) & (self.up >= 0.0)
 
     def wider(self, factor: float) -> Cells:
-        """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays, and stay where they
-        are beyond CROSSED."""
+        """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays, and stay
+        where they are beyond CROSSED."""
         clearance = self.clearance
         shift = np.where(clearance, 0.0, (factor - 1.0) * self.threshold)
         scale = np.where(clearance & (self.up + self.width <= CROSSED), factor, 1.0)

@@ -32,7 +32,7 @@ def fitted(unit: Unit, effects=(), seed=0, power=1.0):
         patch.setattr(module, "POWER", power)
         for name, value in (("WALKERS", 16), ("FIRST_STEPS", 6), ("MOST_STEPS", 6)):
             patch.setattr(sample, name, value)
-        return infer(linearise(reduce_unit(unit, 30), effects), (), seed)
+        return infer(linearise(reduce_unit(unit, 30), effects)[0], (), seed)
 
 
 def truth_of(known, torque):

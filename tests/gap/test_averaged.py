@@ -57,7 +57,7 @@ def test_a_diagnosis_goes_on_from_the_fit_of_the_same_files(monkeypatch):
     """Weighed once for one set of files; anew where a file or the unit differs, or where no file is known."""
     calls = []
     monkeypatch.setattr(averaged, "prepare", lambda unit, *rest: calls.append(unit.name))
-    monkeypatch.setattr(averaged, "weigh", lambda linear, allowed: object())
+    monkeypatch.setattr(averaged, "weigh", lambda linears, allowed: object())
     monkeypatch.setattr(averaged, "_LAST", {})
     made = UNITS["none"]()
     read = replace(made, file_sha256="a")

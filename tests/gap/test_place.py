@@ -13,13 +13,14 @@ from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink
 
 @cache
 def gap_of(name):
-    return prepared(name), where.estimate_gap(prepared(name), np.random.default_rng(0))
+    linear = prepared(name)[0]
+    return linear, where.estimate_gap(linear, np.random.default_rng(0))
 
 
 def shrunk(unit, name):
     linear, gap = gap_of(unit)
-    before, after = (fit_hypothesis(linear, h, linear.design, levels(linear, h)) for h in ((), (name,)))
-    return shrink(linear, before, after, gap.weight)
+    before, after = (fit_hypothesis(linear, h, levels(linear, h)) for h in ((), (name,)))
+    return shrink(before, after, gap.weight)
 
 
 def closed(unit, name):

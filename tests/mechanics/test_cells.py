@@ -184,6 +184,12 @@ def test_a_wider_clearance_is_crossed_at_torques_that_are_larger_alike(turning, 
     np.testing.assert_allclose(wide.ends(along(factor * torque)), narrow.ends(along(torque)), atol=1e-12)
 
 
+def test_relays_near_the_tip_keep_their_torques():
+    knots = np.array([0.0, 0.3, 0.7, 1.0])
+    cells = Cells(knots[:-1], -knots[1:], np.diff(knots), 2 * np.diff(knots))
+    np.testing.assert_allclose(cells.wider(1.1).up, [0.0, 0.33, 0.7])
+
+
 @pytest.mark.parametrize("name", CELLS)
 def test_states_bound_the_neutral_one(name):
     torque = path(np.array([0.0, 0.15, -0.15, 0.1]))

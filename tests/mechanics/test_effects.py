@@ -7,7 +7,7 @@ import pytest
 
 from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
 from backdrive_bayes.mechanics import registry
-from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, PathEffect, SpreadEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, GrowthEffect, PathEffect, SpreadEffect, TangentEffect
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
 from backdrive_bayes.records.reduction import Blocks
@@ -15,7 +15,8 @@ from backdrive_bayes.records.reduction import Blocks
 TERMS = {t.name: t for terms in registry.LIBRARY.values() for t in terms} | {registry.UNKNOWN.name: registry.UNKNOWN}
 PATHS = [n for n, t in TERMS.items() if isinstance(t, PathEffect)]
 TANGENTS = [n for n, t in TERMS.items() if isinstance(t, TangentEffect)]
-CONTEXT = Context(0.1, 0.02, np.array([0.2, 2.0]), np.array([25.0, 2.5]), 2e-3, 1e-3)
+RATES = (0.2, 1.0, 2.0)
+CONTEXT = Context(0.1, 0.02, np.array(RATES), 5.0 / np.array(RATES), 2e-3, 1e-3)
 TURNING = np.array([0.0, 1.0, -1.0, 1.0])
 LATE = {"lag_spread": Distortion(lag_s=0.02)}
 """A lag smooths only where there is one."""
@@ -39,7 +40,7 @@ def record(rate, sign=1.0, per_leg=30):
     )
 
 
-def unit(sign=1.0, rates=(0.2, 2.0)):
+def unit(sign=1.0, rates=RATES):
     """What designs need of a reduced unit."""
     blocks, rates = tuple(record(r, sign) for r in rates), np.array(rates)
     return SimpleNamespace(blocks=blocks, torque_scale_nm=0.1, context=Context(0.1, 0.02, rates, 5.0 / rates, 2e-3, 1e-3))
@@ -95,8 +96,8 @@ def test_what_breaks_oddness_is_even_under_mirrored_torque(name):
 def test_what_breaks_rate_independence_is_odd_and_depends_on_the_rate(name):
     here, there = column(name, unit()), column(name, unit(-1.0))
     np.testing.assert_allclose(there[0], -here[0], atol=2e-5 * np.abs(here[0]).max())
-    fast, slow = column(name, unit(rates=(0.2, 2.0))), column(name, unit(rates=(0.2, 0.22)))
-    assert np.abs(fast[1] - slow[1]).max() > 0.05 * max(np.abs(c).max() for c in here)
+    fast, slow = column(name, unit(rates=(0.2, 1.0, 2.0))), column(name, unit(rates=(0.2, 0.26, 0.28)))
+    assert max(np.abs(a - b).max() for a, b in zip(fast, slow, strict=True)) > 0.05 * max(np.abs(c).max() for c in here)
 
 
 def test_a_wrong_claim_would_be_seen():
@@ -123,10 +124,18 @@ def test_creep_vanishes_where_the_torque_is_slow_and_holds_where_it_is_fast():
 
 def test_the_lag_grows_with_the_rate_and_exponents_with_its_logarithm():
     here = column("sensor_lag", unit())
-    np.testing.assert_allclose(here[1][5:25], 10 * here[0][5:25], rtol=0.05, atol=0.02 * np.abs(here[1]).max())
+    np.testing.assert_allclose(here[2][5:25], 10 * here[0][5:25], rtol=0.05, atol=0.02 * np.abs(here[2]).max())
     for name in ("friction_rate", "drag_rate"):
-        slow, fast = column(name, unit())
+        slow, fast = column(name, unit(rates=(0.2, 2.0)))
         np.testing.assert_allclose(slow, -fast, atol=0.05 * np.abs(fast).max())
+
+
+def test_a_bend_needs_three_rates_and_has_no_mean():
+    for name in ("friction_bend", "drag_bend"):
+        columns = column(name, unit())
+        np.testing.assert_allclose(sum(columns), 0.0, atol=0.05 * np.abs(columns).max())
+        core = class_groups(unit(rates=(0.2, 2.0)), REDUCER, Distortion())
+        assert tangent_groups(unit(rates=(0.2, 2.0)), REDUCER, core, Distortion(), weights(), (TERMS[name],)) == ()
 
 
 def test_what_is_unexplained_adds_to_one_on_every_leg():
@@ -140,16 +149,16 @@ def test_a_record_has_the_same_columns_alone_and_among_others(name):
     if isinstance(term, PathEffect):
         both, alone = unit(), SimpleNamespace(**(vars(unit()) | {"blocks": unit().blocks[1:]}))
         assert np.array_equal(path_group(both, term).columns[1], path_group(alone, term).columns[0])
-    elif name not in ("friction_rate", "drag_rate"):
-        both, alone = column(name, unit()), column(name, unit(rates=(2.0,)))
-        np.testing.assert_allclose(alone[0], both[1], atol=1e-9 * np.abs(both[1]).max())
+    elif not isinstance(term, GrowthEffect):
+        both, alone = column(name, unit()), column(name, unit(rates=RATES[2:]))
+        np.testing.assert_allclose(alone[0], both[2], atol=1e-9 * np.abs(both[2]).max())
 
 
 def test_tangents_are_derivatives_of_the_prediction():
     """Against a difference quotient ten times as wide."""
     for name in TANGENTS:
         term, reduced, by = TERMS[name], unit(), weights()
-        step = 10 * term.step
+        step = 0.02 if isinstance(term, GrowthEffect) else 2e-4
         curves = [class_groups(reduced, REDUCER, Distortion(**{term.parameter: s * step})).predict(by, list(by)) for s in (1, -1)]
         for r, columns in enumerate(column(name, reduced)):
             quotient = (curves[0][r] - curves[1][r]) / (2 * step)

@@ -76,7 +76,7 @@ UNITS = {
 
 @cache
 def prepared(name):
-    """The linear model of one of UNITS."""
+    """The linear models of one of UNITS."""
     return prepare(UNITS[name]())
 
 
