@@ -180,7 +180,7 @@ class _Search:
         core = class_groups(self.reduced, reducer, distortion, weights.get("clearance"))
         tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
         design = core.joined(*self.fixed, *tangents)
-        shift = _shift(design, distortion, self.effects)
+        shift = _shift(design, distortion, self.effects, self.reduced.context)
         angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
         if start is not None and start.size != len(design.groups):
             start = None
@@ -219,13 +219,16 @@ class _Search:
         return replace(linear.distortion, **tangent)
 
 
-def _shift(design, distortion, effects):
-    """What the tangent effects' columns make of the distortion itself."""
+def _shift(design, distortion, effects, context):
+    """What the tangent effects' columns make of the distortion itself, less the bench's usual friction."""
     found = [0.0] * len(design.groups[0].columns)
     for effect in effects:
         if isinstance(effect, TangentEffect) and effect.name in design.names:
             group = design.groups[design.names.index(effect.name)]
             found = [f + c[:, 0] * getattr(distortion, effect.parameter) for f, c in zip(found, group.columns, strict=True)]
+        if effect is BENCH_HYSTERESIS:
+            group = design.groups[design.names.index(effect.name)]
+            found = [f - c[:, 0] * effect.usual(context) for f, c in zip(found, group.columns, strict=True)]
     return found
 
 

@@ -26,6 +26,8 @@ INITIAL_THRESHOLDS = (0.01, 0.04, 0.12, 0.3, 0.6)
 """Thresholds at which a record's friction may have been left anywhere."""
 ZONES = 12
 """Groups of clearance relays whose first state is free in each record."""
+HALVINGS = 4
+"""How often the interval of knots next to zero is halved: the width at zero torque is that of a point, block means are not."""
 BASELINE = ("geometric", "elastic", "friction")
 
 
@@ -164,10 +166,12 @@ def _apart(values):
 def place_knots(torques, most: int, least: float) -> np.ndarray:
     """Knots of clearance and free play at quantiles of the blocks' torques |z|, at least ``least`` apart, from 0 to TOP.
 
-    Blocks are short where the angle moves fast, so the knots are dense where the loops are steep.
+    Blocks are short where the angle moves fast, so the knots are dense where the loops are steep; next to zero they are denser.
     """
     wanted = np.quantile(np.abs(torques), np.linspace(0.0, 1.0, most + 1))
-    return spaced(np.r_[0.0, wanted[1:], TOP], least)
+    knots = spaced(np.r_[0.0, wanted[1:], TOP], least)
+    halved = knots[1] * 0.5 ** np.arange(HALVINGS, 0, -1)
+    return np.r_[0.0, halved[halved >= least], knots[1:]]
 
 
 def spaced(knots, least: float) -> np.ndarray:

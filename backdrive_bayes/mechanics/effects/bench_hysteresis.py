@@ -1,6 +1,11 @@
 """Friction between torque sensor and output shaft (cables, bearings of the bench): part of every test, below what can be told."""
 
+import numpy as np
+
 from backdrive_bayes.mechanics.effect import Effect
+
+SIZE = 0.1
+"""Scale of a half-normal prior, in the torque noise of a sample: friction never helps the motion."""
 
 
 class BenchHysteresis(Effect):
@@ -9,9 +14,13 @@ class BenchHysteresis(Effect):
     It looks like friction of the reducer, so that no record tells it: it widens the intervals of what the loop encloses.
     """
 
+    def usual(self, context) -> float:
+        """Mean of the prior."""
+        return SIZE * np.sqrt(2.0 / np.pi) * context.torque_noise
+
     def trace(self, context):
-        """A tenth of the torque noise of a sample."""
-        return 0.1 * context.torque_noise
+        """Standard deviation of the prior."""
+        return SIZE * np.sqrt(1.0 - 2.0 / np.pi) * context.torque_noise
 
     def present(self, context):
         """As a trace: it is never an answer."""
