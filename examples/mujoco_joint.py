@@ -63,8 +63,9 @@ def answer(time_s, torque_nm):
 
 def same_path(record):
     """Time [s] and torque [N·m] of the loop that a record went through, from rest at the engine's steps."""
-    turns = record.amplitude_nm * np.array([0.0, 1.0, -1.0, 1.0])
-    corner = np.r_[0.0, np.cumsum(np.abs(np.diff(turns)))] / record.loading_rate_nm_per_s
+    turns = (record.amplitude_nm or np.abs(record.torque_nm).max()) * np.array([0.0, 1.0, -1.0, 1.0])
+    travel = np.r_[0.0, np.cumsum(np.abs(np.diff(turns)))]
+    corner = travel / (record.loading_rate_nm_per_s or travel[-1] / np.ptp(record.time_s))
     time = np.arange(0.0, corner[-1], STEP_S)
     return time, np.interp(time, corner, turns)
 

@@ -1,5 +1,6 @@
 """The five lines of the README, results that show themselves, and the example scripts."""
 
+import json
 import os
 import subprocess
 import sys
@@ -113,6 +114,14 @@ def test_example_acceptance_by_batch(units, tmp_path):
     limits.write_text("[peak_angle_rad]\nmax = 1")
     said = run("acceptance_by_batch.py", units[0], *[units[1]] * 3, "--limits", limits)
     assert "global risks: {" in said
+
+
+def test_example_mujoco_joint(units, tmp_path):
+    pytest.importorskip("mujoco", reason="the extra bench is not installed")
+    said = run("mujoco_joint.py", units[0], "--out", tmp_path / "out")
+    assert "missing in the model: " in said and (tmp_path / "out" / "report.pdf").exists()
+    found = json.loads((tmp_path / "out" / "1-diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert found["simulator"]["unit"] == "mujoco-joint" and found["simulator"]["rms_rad"]["simulated"] > 0.01
 
 
 def test_example_own_effect():

@@ -290,7 +290,7 @@ def _shift(design, distortion, effects, context):
             found = [f + c[:, 0] * getattr(distortion, effect.parameter) for f, c in zip(found, group.columns, strict=True)]
         if effect is BENCH_HYSTERESIS:
             group = design.groups[design.names.index(effect.name)]
-            found = [f - c[:, 0] * effect.usual(context) for f, c in zip(found, group.columns, strict=True)]
+            found = [f - c[:, 0] * BENCH_HYSTERESIS.usual(context) for f, c in zip(found, group.columns, strict=True)]
     return found
 
 

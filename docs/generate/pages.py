@@ -18,7 +18,7 @@ import numpy as np
 import backdrive_bayes.schemas
 from backdrive_bayes.commands.main import VERBS, main
 from backdrive_bayes.engine import diagnostics, infer, parameters, reduced, sample
-from backdrive_bayes.gap import diagnose, probabilities, properties
+from backdrive_bayes.gap import diagnose, probabilities, properties, shrink, simulator
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import reducer
 from backdrive_bayes.mechanics.registry import LIBRARY
@@ -33,6 +33,9 @@ NUMBERS = {
     "step": f"{properties.STEP:g}",
     "large_step": f"{properties.LARGE_STEP:g}",
     "apart": f"{properties.APART:g}",
+    "same_torque": f"{100 * simulator.SAME_TORQUE:g} %",
+    "same_rate": f"{100 * simulator.SAME_RATE:g} %",
+    "smallest_gap": f"{100 * shrink.SMALLEST_GAP:g} %",
     "sure": f"{properties.SURE:g}",
 }
 """Constants of the code that the pages name."""

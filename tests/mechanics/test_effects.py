@@ -7,7 +7,18 @@ import pytest
 
 from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
 from backdrive_bayes.mechanics import registry
-from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, FlankEffect, GrowthEffect, PathEffect, SpreadEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import (
+    Context,
+    Distortion,
+    Effect,
+    FlankEffect,
+    GrowthEffect,
+    PathEffect,
+    SpreadEffect,
+    TangentEffect,
+)
+from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
+from backdrive_bayes.mechanics.effects.bench_hysteresis import SIZE as BENCH_FRICTION
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
 from backdrive_bayes.records.reduction import Blocks
@@ -152,6 +163,13 @@ def test_a_record_has_the_same_columns_alone_and_among_others(name):
     elif not isinstance(term, GrowthEffect):
         both, alone = column(name, unit()), column(name, unit(rates=RATES[2:]))
         np.testing.assert_allclose(alone[0], both[2], atol=1e-9 * np.abs(both[2]).max())
+
+
+def test_friction_of_the_bench_has_one_sign():
+    """Mean and standard deviation are those of a half-normal prior; a symmetric one would be centred at zero."""
+    size = np.abs(BENCH_FRICTION * CONTEXT.torque_noise * np.random.default_rng(3).standard_normal(400_000))
+    assert BENCH_HYSTERESIS.usual(CONTEXT) == pytest.approx(size.mean(), rel=5e-3)
+    assert BENCH_HYSTERESIS.trace(CONTEXT) == pytest.approx(size.std(), rel=5e-3)
 
 
 def test_tangents_are_derivatives_of_the_prediction():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.mechanics.cells import Cells
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import BASELINE, INITIAL_THRESHOLDS, TOP, ZONES, ReducerClass, place_knots, spaced
 
@@ -120,6 +121,28 @@ def test_knots_are_dense_where_blocks_are_and_keep_their_distance():
     inside = np.sum((knots > 0.04) & (knots < 0.06))
     assert inside > 0.7 * knots.size
     assert place_knots(torques, 60, 0.01).size < knots.size
+
+
+def test_a_loop_that_bends_near_zero_torque_keeps_its_width_there():
+    """No block lies nearer to zero than 0.006; relays that cross nearer are held, and not without the halved knots."""
+    torques = np.r_[np.linspace(0.006, 0.03, 200), np.linspace(0.03, 1.0, 60)]
+    knots = place_knots(torques, 60, 2e-4)
+    coarse = knots[(knots == 0.0) | (knots >= 0.006)]
+    assert width_error_at_zero(coarse) > 0.1 and width_error_at_zero(knots) < 0.02
+
+
+def width_error_at_zero(knots):
+    """Of the best loop of the class against clearance that is crossed between 0.0015 and 0.004, as a share of it."""
+    near = np.linspace(-0.01, 0.01, 201)
+    torque = np.r_[0.0, 1.0, near[::-1], -1.0, near, 1.0]
+    history = through(np.arange(torque.size + 0.0), torque, 1.0)
+    reducer = ReducerClass(knots)
+    columns = np.hstack([reducer.part(name).cells.ends(history) for name in ("clearance", "free_play")])
+    truth = Cells(*(np.array([v]) for v in (0.0015, -0.004, 0.0025, 0.005))).ends(history)[:, 0]
+    settled = slice(1, None)
+    fit = columns @ np.linalg.lstsq(columns[settled], truth[settled], rcond=None)[0]
+    falling, rising = (np.flatnonzero(np.abs(history.z1[settled]) < 1e-12) + 1)[[0, -1]]
+    return abs((fit - truth)[falling] - (fit - truth)[rising])
 
 
 def test_spaced_keeps_both_ends():

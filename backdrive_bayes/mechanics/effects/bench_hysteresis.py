@@ -16,11 +16,11 @@ class BenchHysteresis(Effect):
 
     def usual(self, context) -> float:
         """Mean of the prior."""
-        return SIZE * np.sqrt(2.0 / np.pi) * context.torque_noise
+        return float(SIZE * np.sqrt(2.0 / np.pi)) * context.torque_noise
 
     def trace(self, context):
         """Standard deviation of the prior."""
-        return SIZE * np.sqrt(1.0 - 2.0 / np.pi) * context.torque_noise
+        return float(SIZE * np.sqrt(1.0 - 2.0 / np.pi)) * context.torque_noise
 
     def present(self, context):
         """As a trace: it is never an answer."""
