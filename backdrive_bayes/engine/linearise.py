@@ -126,7 +126,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     for count in range(min(len(bent), MOST_BENT) + 1 if bent else 0):
         for some in itertools.combinations(bent, count):
             search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
-            found.append(search.run(_only(reach, some), STEPS, refine=True))
+            found.append(search.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter))
     return tuple(_without(linear, WAVE) for linear in found)
 
 
@@ -193,9 +193,10 @@ class _Search:
     fixed: tuple[Group, ...]
     bending: tuple[str, ...] = tuple(BENDING)
 
-    def run(self, distortion: Distortion, steps: int, refine: bool = False) -> Linear:
+    def run(self, distortion: Distortion, steps: int, refine: bool = False, jitter: Jitter | None = None) -> Linear:
         reduced, context = self.reduced, self.reduced.context
-        jitter, learnings = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length), LEARNINGS if refine else 0
+        jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
+        learnings = LEARNINGS if refine else 0
         covariances = reduced.covariances(reduced.slopes(reduced.angles, 2.0), jitter)
         laid, weights, start, refined = None, None, None, 0
         for step in range(steps):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg.lapack import dtrtri
 
 LOG_SCALES = (-14.0, 2.5)
 """Range of log standard deviations of weights: beyond it nothing changes but rounding errors."""
@@ -66,7 +67,7 @@ class Whitened:
         inner[np.diag_indices_from(inner)] += 1.0
         lower = cholesky(inner, lower=True, check_finite=False)
         seen = solve_triangular(lower, scale * self.moment, lower=True, check_finite=False)
-        inverse = solve_triangular(lower, np.eye(scale.size), lower=True, check_finite=False)
+        inverse = dtrtri(lower, lower=1)[0]
         chi2 = max(self.total - float(seen @ seen), 0.0)
         root = scale[:, None] * inverse.T
         dof = self.noise_dof + self.samples

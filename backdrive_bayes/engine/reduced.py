@@ -18,6 +18,10 @@ MOST_BLOCKS = 1200
 """Blocks of all records together beyond which each record gets fewer."""
 UNSETTLED = 0.01
 """Power of the likelihood before a record's first reversal, where the unknown initial state decides what is crossed when."""
+UNREAD = 0.15
+UNREAD_LENGTH = 0.1
+"""Torque that acts on the reducer and is not read (ripple, cables), in the torque noise of a sample, and the torque, in shares of
+the largest, over which it changes: a flank is crossed with one value of it."""
 WHITE_SHARE = 0.2
 """Share of the white noise's standard deviation that is left in a block mean, for the scale of traces."""
 
@@ -97,9 +101,10 @@ class BlockMeans:
         found = []
         for blocks, noise, slope in zip(self.blocks, self.noise, slopes, strict=True):
             matrix = block_covariance(blocks, noise, slope)
-            size = slope * jitter.torque * self.torque_scale_nm
-            apart = np.abs(blocks.torque_nm[:, None] - blocks.torque_nm) / (jitter.length * self.torque_scale_nm)
-            matrix += (blocks.leg[:, None] == blocks.leg) * np.outer(size, size) * np.exp(-apart)
+            apart = np.abs(blocks.torque_nm[:, None] - blocks.torque_nm) / self.torque_scale_nm
+            wander = (jitter.torque * self.torque_scale_nm) ** 2 * np.exp(-apart / jitter.length)
+            wander += (UNREAD * noise.torque_nm) ** 2 * np.exp(-apart / UNREAD_LENGTH)
+            matrix += (blocks.leg[:, None] == blocks.leg) * np.outer(slope, slope) * wander
             found.append(matrix / self.angle_scale_rad**2)
         return found
 

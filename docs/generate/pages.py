@@ -17,7 +17,7 @@ import numpy as np
 
 import backdrive_bayes.schemas
 from backdrive_bayes.commands.main import VERBS, main
-from backdrive_bayes.engine import diagnostics, infer, parameters, reduced, sample
+from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, reduced, sample
 from backdrive_bayes.gap import diagnose, probabilities, properties, shrink, simulator
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import reducer
@@ -25,6 +25,7 @@ from backdrive_bayes.mechanics.registry import LIBRARY
 
 NUMBERS = {
     "unsettled": f"{reduced.UNSETTLED:g}",
+    "bent": f"{linearise.BENT:g}",
     "power": f"{infer.POWER:g}",
     "max_rhat": f"{diagnostics.MAX_RHAT:g}",
     "min_ess": f"{diagnostics.MIN_ESS:g}",
