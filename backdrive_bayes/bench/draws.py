@@ -16,6 +16,11 @@ def sign(rng) -> float:
     return float(rng.choice([-1.0, 1.0]))
 
 
+def scattered(k):
+    """Numbers between 0 and 1 for integers ``k``, spread by the golden ratio: even as a whole, unlike from one to the next."""
+    return (0.5 + 0.5 * (np.sqrt(5.0) - 1.0) * k) % 1.0
+
+
 def ornstein_uhlenbeck(rng, samples: int, keep: float):
     """A stationary first-order process of unit variance, shape (samples,), of which a step keeps the share ``keep``."""
     push = rng.standard_normal(samples)

@@ -17,8 +17,6 @@ from backdrive_bayes.records.record import Record
 ARCMIN = 10800.0 / np.pi
 TRUTH_SCHEMA = "backdrive-bayes/bench-truth/2"
 _POINTS = 400
-_HELD = {"rate_Nm_per_s": "rate_nm_per_s", "time_s": "time_s", "torque_Nm": "torque_nm", "angle_rad": "angle_rad"}
-_HELD |= {"without_rad": "without_rad"}
 
 
 def write_unit(bench: BenchUnit, folder: Path) -> None:
@@ -36,8 +34,7 @@ def write_unit(bench: BenchUnit, folder: Path) -> None:
 def truth_json(bench: BenchUnit) -> dict:
     """The truth of a unit, ready for JSON; noise-free curves thinned to some hundred points a record."""
     truth = bench.truth
-    named = zip(bench.unit.records, truth.records, strict=True)
-    held = {key: getattr(truth.held, name) for key, name in _HELD.items()}
+    records = zip(bench.unit.records, truth.records, strict=True)
     return plain(
         {
             "schema": TRUTH_SCHEMA,
@@ -53,8 +50,8 @@ def truth_json(bench: BenchUnit) -> dict:
             "traces": [
                 {"name": t.name, "height_in_noise_sd": t.height, "parameters": t.effect.parameters()} for t in truth.traces
             ],
-            "records": [{"record": record.name, **_curves(own)} for record, own in named],
-            "held": held,
+            "records": [{"record": record.name, **_curves(own)} for record, own in records],
+            "held": _named(truth.held),
         }
     )
 
@@ -85,16 +82,14 @@ def _planted(planted: PlantedEffect) -> dict:
 
 def _curves(own: RecordTruth) -> dict:
     every = max(1, own.torque_nm.size // _POINTS)
-    curves = {
-        "time_s": own.time_s,
-        "torque_Nm": own.torque_nm,
-        "angle_rad": own.angle_rad,
-        "effect_rad": own.effect_rad,
-        "remainder_rad": own.remainder_rad,
-        "noise_rad": own.noise_rad,
-    }
-    indicators = {"indicators": own.indicators, "clean_indicators": own.clean_indicators}
-    return {**indicators, "every": every, **{k: v[::every] for k, v in curves.items()}}
+    named = _named(own)
+    indicators = {name: named.pop(name) for name in ("indicators", "clean_indicators")}
+    return {**indicators, "every": every, **{name: curve[::every] for name, curve in named.items()}}
+
+
+def _named(value) -> dict:
+    """Fields with the units' own capitals, as all files spell them."""
+    return {f.name.replace("_nm", "_Nm"): getattr(value, f.name) for f in fields(value)}
 
 
 def _csv_gz(record: Record) -> bytes:

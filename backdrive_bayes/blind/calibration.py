@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.blind.intervals import clopper_pearson, mean_of
+from backdrive_bayes.blind.intervals import mean_of, share
 
 BINS = 10
 FLOOR = 1e-6
@@ -65,17 +65,7 @@ def _errors(probability, hits, place):
 
 
 def _bin(k, probability, hit):
-    count = int(hit.sum())
-    low, high = clopper_pearson(count, hit.size)
-    ends = {"from": k / BINS, "to": (k + 1) / BINS}
-    return ends | {
-        "mean_probability": float(probability.mean()),
-        "share": count / hit.size,
-        "count": count,
-        "of": hit.size,
-        "lo": low,
-        "hi": high,
-    }
+    return {"from": k / BINS, "to": (k + 1) / BINS, "mean_probability": float(probability.mean()), **share(hit)}
 
 
 def _columns(pairs):

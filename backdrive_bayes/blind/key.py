@@ -9,7 +9,7 @@ from pathlib import Path
 from backdrive_bayes.bench.registry import NONE
 from backdrive_bayes.bench.truth import BenchUnit
 from backdrive_bayes.blind.request import Request
-from backdrive_bayes.blind.truth_map import true_map
+from backdrive_bayes.blind.where import rounded, true_map
 from backdrive_bayes.errors import BadInput
 
 SCHEMA = "backdrive-bayes/blind-key/1"
@@ -30,13 +30,13 @@ def key_entry(bench: BenchUnit, folder_sha256: str) -> dict:
         "label": label_of(bench.truth.answer),
         "effects": list(bench.truth.answer),
         "planted": [
-            {"name": p.name, "severity": p.severity, "height": _short(p.height), "limited": bool(p.limited)} for p in planted
+            {"name": p.name, "severity": p.severity, "height": rounded(p.height), "limited": bool(p.limited)} for p in planted
         ],
         "severity": max((p.severity for p in planted), default=None),
-        "height": max((_short(p.height) for p in planted), default=0.0),
+        "height": max((rounded(p.height) for p in planted), default=0.0),
         "limited": any(bool(p.limited) for p in planted),
         "where": {name: true_map(bench, f"{name}_rad") for name in ("remainder", "effect")},
-        "indicators": [{"record": r.name, **{k: _short(v) for k, v in t.indicators.items()}} for r, t in named],
+        "indicators": [{"record": r.name, **{k: rounded(v) for k, v in t.indicators.items()}} for r, t in named],
     }
 
 
@@ -62,8 +62,3 @@ def folder_digest(folder: Path) -> str:
     """SHA-256 over names and contents of all files in a unit's folder."""
     lines = [f"{path.name} {digest(path.read_bytes())}\n" for path in sorted(Path(folder).iterdir())]
     return digest("".join(lines).encode())
-
-
-def _short(value) -> float:
-    """Few enough digits that the last bits of arithmetic do not show."""
-    return float(f"{value:.5g}")

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from backdrive_bayes.bench.plan import DEFAULT_PLAN, Plan, make_plan, random_plan
-from backdrive_bayes.bench.registry import EFFECTS, NONE, UNKNOWN
+from backdrive_bayes.bench.registry import EFFECTS, MEMBERS, NONE, UNKNOWN
 from backdrive_bayes.errors import BadInput
 
-BASELINE_OWN = ("load_dependent_friction", "hardening_stiffness")
-"""Effects that the baseline holds itself, so that they are no gap and are never drawn."""
-LISTED = tuple(name for name in EFFECTS if name not in BASELINE_OWN)
-"""The effects that a diagnosis may name."""
+LISTED = tuple(name for name in EFFECTS if name not in MEMBERS)
+"""The effects that a diagnosis may name: the baseline holds the members itself, so that they are no gap and are never drawn."""
 PAIR = "pair"
 CLASSES = (NONE, *LISTED, UNKNOWN, PAIR)
 

@@ -20,8 +20,10 @@ from backdrive_bayes.results import FLEET
 INDICATORS = ("lost_motion_rad", "loop_area_J", "dissipation_ratio")
 SIGMAS = 3.0
 """Half-width of the control limits; of a normal process one unit in 370 lies outside."""
-MEAN_RANGE, LARGEST_RANGE = 1.128, 3.267
-"""Mean of a moving range of two in standard deviations of a normal process (d₂), and its upper limit in means (D₄)."""
+MEAN_RANGE = 2.0 / np.sqrt(np.pi)
+"""Mean of a moving range of two in standard deviations of a normal process (d₂)."""
+LARGEST_RANGE = 1.0 + SIGMAS * np.sqrt(2.0 - MEAN_RANGE**2) / MEAN_RANGE
+"""The upper limit of a moving range in its means (D₄): so many of its own standard deviations above."""
 MOST_WORST = 20
 ORDERS = ("test_date", "serial", "unit")
 _NEEDED = (
@@ -181,5 +183,3 @@ def _worst(done, charted, charts, keys):
 def _natural(text, then):
     """Sorts no. 10 behind no. 9."""
     return [(part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"(\d+)", text)], then
-
-

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput, MissingExtra
@@ -40,7 +41,8 @@ def compact(out: Path, units: list[FleetUnit]) -> int:
     schema = pa.schema([(n, pa.string() if kind == "null" and n in TEXT else types[kind]) for n, kind in kinds.items()])
     count, buffer = 0, io.BytesIO()
     with parquet.ParquetWriter(buffer, schema, compression="zstd") as writer:
-        for rows in _batches(_all(out, units)):
+        left = _all(out, units)
+        while rows := list(islice(left, ROWS)):
             writer.write_table(pa.Table.from_pylist(rows, schema=schema))
             count += len(rows)
     try:
@@ -61,17 +63,6 @@ def _wider(kind, value):
 
 def _all(out, units) -> Iterator[dict]:
     return (row for unit in units for row in rows_of(out, unit))
-
-
-def _batches(rows: Iterable[dict]) -> Iterator[list[dict]]:
-    batch: list[dict] = []
-    for row in rows:
-        batch.append(row)
-        if len(batch) == ROWS:
-            yield batch
-            batch = []
-    if batch:
-        yield batch
 
 
 def require_pyarrow():

@@ -10,6 +10,7 @@ from backdrive_bayes.engine.diagnostics import diagnose_draws
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
 from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad, zero_torque_width_rad
+from backdrive_bayes.indicators.intervals import ends
 from backdrive_bayes.records.measured_loop import MeasuredLoop, measured_loops
 from backdrive_bayes.records.record import Unit
 
@@ -49,7 +50,7 @@ def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, .
             value = getattr(loop, name)
             if value is None:
                 continue
-            lo, hi = np.quantile(function(loops), [0.5 - level / 2, 0.5 + level / 2])
+            lo, hi = np.quantile(function(loops), ends(level)[::2])
             room = STANDARD_ERRORS * getattr(loop, f"{name}_sd") + SHARE[loop.basis] * abs(value)
             if not lo - room <= value <= hi + room:
                 inferred = f"inferred as {lo:.4g} to {hi:.4g} {unit}"

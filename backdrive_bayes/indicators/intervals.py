@@ -7,12 +7,25 @@ import numpy as np
 LEVEL = 0.9
 
 
+def ends(level: float) -> list[float]:
+    """Shares of the lower end, the median and the upper end of the central interval at a level."""
+    return [0.5 - level / 2, 0.5, 0.5 + level / 2]
+
+
+def named(lo: float, median: float, hi: float) -> dict[str, float]:
+    """An interval as result files write it."""
+    return {"median": float(median), "lo": float(lo), "hi": float(hi)}
+
+
+def bands(values, level: float = LEVEL) -> dict[str, list[float]]:
+    """Median and central interval at every point of curves (draws, points)."""
+    lo, median, hi = np.quantile(values, ends(level), axis=0)
+    return {"median": median.tolist(), "lo": lo.tolist(), "hi": hi.tolist()}
+
+
 def interval(values, level: float = LEVEL) -> dict | None:
     """Median and central interval of ``values`` (draws,); None where the quantity is not defined."""
-    if np.isnan(values).all():
-        return None
-    lo, median, hi = np.quantile(values, [0.5 - level / 2, 0.5, 0.5 + level / 2])
-    return {"median": float(median), "lo": float(lo), "hi": float(hi)}
+    return None if np.isnan(values).all() else named(*np.quantile(values, ends(level)))
 
 
 def over_positions(area, ratio, level: float = LEVEL) -> dict:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
+from backdrive_bayes.indicators.draws import core_indicators
+from backdrive_bayes.indicators.loop import Loops
 from backdrive_bayes.mechanics.published import PublishedLoop
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.record import Record
@@ -74,19 +76,8 @@ def _branch_json(loop, torque, angle, direction, rated):
 def _indicators(fits, record, rated, k):
     amplitude = 0.5 * float(np.ptp(np.quantile(record.torque_nm, [0.001, 0.999])))
     torque = np.linspace(-amplitude, amplitude, 4001)
-    rising, falling = fits[1].angle_rad(torque, 1), fits[-1].angle_rad(torque, -1)
-    middle = 0.5 * (torque[1:] + torque[:-1])
-    up = middle > 0
-    absorbed = np.diff(rising)[up] @ middle[up] - np.diff(falling)[~up] @ middle[~up]
-    area = float(np.trapezoid(falling - rising, torque))
-    mean, t = 0.5 * (rising + falling), k * rated
-    return {
-        "lost_motion_rad": float(np.interp(t, torque, mean) - np.interp(-t, torque, mean)) if t <= amplitude else None,
-        "zero_torque_width_rad": float(np.interp(0.0, torque, falling - rising)),
-        "peak_angle_rad": float(0.5 * (mean[-1] - mean[0])),
-        "loop_area_J": area,
-        "absorbed_J": float(absorbed),
-        "dissipation_ratio": float(area / absorbed),
+    found = core_indicators(Loops(torque, *(fits[d].angle_rad(torque, d)[None] for d in (1, -1))), k * rated)
+    return {name: None if np.isnan(value[0]) else float(value[0]) for name, value in found.items()} | {
         # With its free offsets the fit hides friction: the closed form knows only the tanh terms.
         "closed_form_loop_area_J": float(np.mean([f.area_j(amplitude) for f in fits.values()])),
     }

@@ -8,7 +8,7 @@ from backdrive_bayes.engine.parameters import PARAMETERS, implied_prior
 from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators.convergence import convergence_json
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
-from backdrive_bayes.indicators.intervals import LEVEL, interval, over_positions
+from backdrive_bayes.indicators.intervals import LEVEL, bands, interval, over_positions
 from backdrive_bayes.indicators.loop import module_loops
 from backdrive_bayes.results import INDICATORS
 
@@ -71,11 +71,11 @@ def _known(values) -> bool:
 def _loop_json(loops, level):
     # Where on its scale the encoder reads the loop is no property of the reducer: bands are those of the loop's shape.
     middle = 0.5 * (loops.rising.mean(axis=1) + loops.falling.mean(axis=1))
-    shift, bands = np.median(middle) - middle[:, None], {}
-    for branch in ("rising", "falling"):
-        lo, median, hi = np.quantile(getattr(loops, branch) + shift, [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
-        bands[f"{branch}_rad"] = {"median": median.tolist(), "lo": lo.tolist(), "hi": hi.tolist()}
-    return {"torque_Nm": loops.torque_nm.tolist(), **bands}
+    shift = np.median(middle) - middle[:, None]
+    return {
+        "torque_Nm": loops.torque_nm.tolist(),
+        **{f"{branch}_rad": bands(getattr(loops, branch) + shift, level) for branch in ("rising", "falling")},
+    }
 
 
 def _modules_json(posterior, torque, rate):
@@ -88,35 +88,33 @@ def _modules_json(posterior, torque, rate):
 
 def _torque_energy_json(loops, found, level):
     torque, energy = ind.torque_energy(loops)
-    lo, median, hi = np.quantile(energy, [0.5 - level / 2, 0.5, 0.5 + level / 2], axis=0)
+    band = bands(energy, level)
     return {
         "torque_Nm": torque.tolist(),
-        "median_J_per_Nm": median.tolist(),
-        "lo": lo.tolist(),
-        "hi": hi.tolist(),
-        "tau1_Nm": interval(found["tau1_Nm"], level),
-        "tau2_Nm": interval(found["tau2_Nm"], level),
+        "median_J_per_Nm": band.pop("median"),
+        **band,
+        **{name: interval(found[name], level) for name in ("tau1_Nm", "tau2_Nm")},
     }
 
 
 def _by_amplitude_json(draws, rate, amplitude, level):
     """S(t) and u(t) of loops of amplitude t, and their extremes."""
     amplitudes = _positions(amplitude)
-    found = [draws.loops(rate, t, True) for t in amplitudes]
-    values = (np.stack([f(x) for x in found]) for f in (ind.loop_area_j, ind.dissipation_ratio))
-    return {"amplitude_Nm": amplitudes.tolist(), **over_positions(*values, level)}
+    return {"amplitude_Nm": amplitudes.tolist(), **_energies([draws.loops(rate, t, True) for t in amplitudes], level)}
 
 
 def _windowed_json(loops, level):
     """The same of windows |τ| ≤ t cut out of the measured loop; this u(t) may exceed 1, for a window is no closed loop."""
     torque = _positions(loops.torque_nm[-1])
-    windows = [loops.within(t) for t in torque]
-    values = (np.stack([f(x) for x in windows]) for f in (ind.loop_area_j, ind.dissipation_ratio))
-    return {"torque_Nm": torque.tolist(), **over_positions(*values, level)}
+    return {"torque_Nm": torque.tolist(), **_energies([loops.within(t) for t in torque], level)}
 
 
 def _positions(amplitude):
     return amplitude * np.arange(1, POSITIONS + 1) / POSITIONS
+
+
+def _energies(loops, level):
+    return over_positions(*(np.stack([f(x) for x in loops]) for f in (ind.loop_area_j, ind.dissipation_ratio)), level)
 
 
 def _noise_json(noise):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from backdrive_bayes.indicators.intervals import interval
+from backdrive_bayes.indicators.intervals import ends, interval, named
 from backdrive_bayes.pooling.hierarchy import FEWEST_UNITS, Hierarchy, sample_hierarchy
 from backdrive_bayes.pooling.loss import MOST_BITS, batch_loss, fit_loss, unit_loss
 from backdrive_bayes.pooling.mixture import Mixture, fit_mixture
@@ -91,12 +91,11 @@ def pool_quantity(names, draws, priors, seed: int, level: float) -> dict:
 
 
 def _told(hierarchy: Hierarchy, small: Hierarchy, back, level) -> dict:
-    lo, median, hi = back(small.next_unit.quantile([0.5 - level / 2, 0.5, 0.5 + level / 2]))
     below, above = back(small.next_unit.quantile(ndtr([-1.0, 1.0])))
     return {
         "mean": interval(back(hierarchy.mean), level),
         "spread": shortest(hierarchy.spread, level),
-        "next_unit": {"median": float(median), "lo": float(lo), "hi": float(hi), "sd": float(0.5 * (above - below))},
+        "next_unit": named(*back(small.next_unit.quantile(ends(level)))) | {"sd": float(0.5 * (above - below))},
         "predictive": {"mean": small.mean.tolist(), "spread": small.spread.tolist()},
     }
 
@@ -110,7 +109,7 @@ def shortest(values, level: float) -> dict:
     low, high = np.quantile(values, tail), np.quantile(values, tail + level)
     low[0], high[-1] = 0.0, np.max(values)
     best = int(np.argmin(high - low))
-    return {"median": float(np.median(values)), "lo": float(low[best]), "hi": float(high[best])}
+    return named(low[best], np.median(values), high[best])
 
 
 def _row(name, draws, unit: Likelihood, level) -> dict:
@@ -123,8 +122,7 @@ def _pooled(small, unit, back, level) -> dict:
     found = {"loss_bits": max(bits, unit.loss), "effective_draws": effective}
     if bits > MOST_BITS:
         return found | {"refused": f"{effective:.0f} effective draws lie where the other units put it: {_APART}"}
-    lo, median, hi = back(small.pooled(unit.mixture).quantile([0.5 - level / 2, 0.5, 0.5 + level / 2]))
-    return found | {"pooled": {"median": float(median), "lo": float(lo), "hi": float(hi)}}
+    return found | {"pooled": named(*back(small.pooled(unit.mixture).quantile(ends(level))))}
 
 
 def _batch_loss(small, units) -> float:

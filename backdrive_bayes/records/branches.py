@@ -49,15 +49,10 @@ def find_segments(time_s: np.ndarray, torque_nm: np.ndarray) -> tuple[Segment, .
     for _ in range(2):  # the second pass has better neighbours to look between
         inner = {refine_turning_point(time, torque, *edges[k : k + 3]) for k in range(len(edges) - 2)}
         edges = [0, *sorted(edge for edge in inner if 0 < edge < len(torque)), len(torque)]
-    return tuple(
-        Segment(start, stop, _direction(torque[start:stop]))
-        for start, stop in zip(edges[:-1], edges[1:], strict=True)
-    )
+    return tuple(Segment(start, stop, _direction(torque[start:stop])) for start, stop in zip(edges[:-1], edges[1:], strict=True))
 
 
-def find_branches(
-    time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]
-) -> tuple[Branch, ...]:
+def find_branches(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> tuple[Branch, ...]:
     """Cut segments at zero torque and number their cycles; the branches cover the segments' samples.
 
     A segment that only grazes zero within the noise (the start of a first loading) is not cut.

@@ -33,11 +33,7 @@ def check_unit(unit: Unit, k: float = LOST_MOTION_SHARE) -> dict:
     records = [check_record(record, unit.rated_torque_nm, k) for record in unit.records]
     findings = [*_unit_findings(unit, records), *(Finding(**row) for record in records for row in record["findings"])]
     errors, warnings = errors_of(findings), len(warnings_of(findings))
-    clean = (
-        "nothing speaks against it"
-        if not warnings
-        else f"{warnings} warning{'s'[: warnings != 1]} to keep in mind"
-    )
+    clean = "nothing speaks against it" if not warnings else f"{warnings} warning{'s'[: warnings != 1]} to keep in mind"
     return {
         "schema": CHECK,
         "unit": unit.name,
@@ -81,10 +77,7 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
         "cycles": int(cycle_count(torque, segments) + 0.05),
         "torque_range_Nm": [low, high],
         "amplitude_Nm": {"estimated": 0.5 * (high - low), "declared": record.amplitude_nm},
-        "loading_rate_Nm_per_s": {
-            "estimated": loading_rate(time, torque, segments),
-            "declared": record.loading_rate_nm_per_s,
-        },
+        "loading_rate_Nm_per_s": {"estimated": loading_rate(time, torque, segments), "declared": record.loading_rate_nm_per_s},
         "closure": closure(time, torque, angle, branches, noise),
         "noise": _si_names(asdict(noise)),
         "angle_rise": rise,

@@ -21,11 +21,7 @@ def strictly_rising(time_s: np.ndarray, first_row: int, where: str) -> tuple[np.
     back = np.flatnonzero(steps < 0.0)
     if back.size:
         row = back[0] + 1
-        raise BadInput(
-            f"{where}, row {first_row + row}, time",
-            f"more than {time_s[row - 1]:.9g} s",
-            f"{time_s[row]:.9g} s",
-        )
+        raise BadInput(f"{where}, row {first_row + row}, time", f"more than {time_s[row - 1]:.9g} s", f"{time_s[row]:.9g} s")
     shared = int(np.count_nonzero(steps == 0.0))
     if shared == 0:
         return time_s, ()
@@ -35,10 +31,7 @@ def strictly_rising(time_s: np.ndarray, first_row: int, where: str) -> tuple[np.
     retimed = _interpolated(time_s) if shared < 0.05 * len(steps) else _even(time_s, tick)
     if not np.all(np.diff(retimed) > 0.0):
         retimed = np.linspace(time_s[0], time_s[-1], len(time_s))
-    note = (
-        f"coarse clock: {shared + 1} of {len(time_s)} samples share a stamp (step {tick:.3g} s); "
-        f"re-timed by index"
-    )
+    note = f"coarse clock: {shared + 1} of {len(time_s)} samples share a stamp (step {tick:.3g} s); re-timed by index"
     return retimed, (note,)
 
 
@@ -46,9 +39,7 @@ def _even(time: np.ndarray, tick: float) -> np.ndarray:
     """Re-time the stretches between gaps, each by its index; sampling may drift slowly."""
     edges = [0, *(np.flatnonzero(np.diff(time) > _GAP_TICKS * tick) + 1), len(time)]
     period = (time[-1] - time[0]) / (len(time) - 1)
-    pieces = [
-        _stretch(time[start:stop], tick, period) for start, stop in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    pieces = [_stretch(time[start:stop], tick, period) for start, stop in zip(edges[:-1], edges[1:], strict=True)]
     return np.concatenate(pieces)
 
 

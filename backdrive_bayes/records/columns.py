@@ -2,16 +2,63 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.records.header_names import is_named
-from backdrive_bayes.records.quantities import BRACKETS, UNITS, Quantity, canonical, parse_quantity, split_unit, suggestion
+from backdrive_bayes.records.quantities import (
+    BRACKETS,
+    UNITS,
+    Quantity,
+    canonical,
+    is_named,
+    parse_quantity,
+    split_unit,
+    suggestion,
+)
+from backdrive_bayes.records.readers import read_columns
 
 DEFAULT_COLUMNS = {"time": "time_s", "torque": "torque_Nm", "angle": "angle_arcmin"}
 _EXAMPLES = {"time": "s", "torque": "Nm", "angle": "deg"}
 _SPELLED_OUT = {"Nm": "N·m", "mNm": "mN·m", "uNm": "µN·m", "kNm": "kN·m", "Ncm": "N·cm", "Nmm": "N·mm"}
 _UNIT_FILE = "unit.toml"
+_LARGEST = 1e60
+"""No bench writes a larger number, and squares and products of larger ones overflow."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Channels of a file in s, N·m and rad: arrays (samples,) by kind, the row of sample 0, notes, and their spelling there."""
+
+    values: dict[str, np.ndarray]
+    first_row: int
+    notes: tuple[str, ...]
+    spelling: dict[str, str]
+
+
+def read_channels(path: Path, kinds, asked: dict[str, str]) -> Channels:
+    """The channels of these ``kinds`` of a record file, under the names ``asked`` for or the default ones; raises BadInput."""
+    found: dict[str, tuple[str, Quantity]] = {}
+
+    def choose(headers: tuple[str, ...]) -> list[str]:
+        found.update({kind: find_column(headers, kind, asked.get(kind), str(path)) for kind in kinds})
+        chosen = [header for header, _ in found.values()]
+        if len(set(chosen)) < len(chosen):
+            raise BadInput(path, "three different columns for time, torque and angle", ", ".join(chosen))
+        return chosen
+
+    columns = read_columns(path, choose)
+    values = {}
+    for column, (kind, (header, quantity)) in zip(columns.values, found.items(), strict=True):
+        bad = np.flatnonzero(np.abs(column) > _LARGEST)
+        if bad.size:
+            where = f"{path}, row {columns.first_row + bad[0]}, column '{header}'"
+            raise BadInput(where, f"a number below {_LARGEST:g}", f"{column[bad[0]]:.3g}")
+        values[kind] = column * quantity.to_si
+    notes = (*columns.notes, *(quantity.note for _, quantity in found.values() if quantity.note))
+    return Channels(values, columns.first_row, notes, {kind: spelling(*chosen) for kind, chosen in found.items()})
 
 
 def find_column(headers: tuple[str, ...], kind: str, asked: str | None, where: str) -> tuple[str, Quantity]:
@@ -94,9 +141,7 @@ def _agreed(header: str, asked: str, kind: str, where: str) -> Quantity:
     spelled = [text for text in (asked, header) if _has_unit(text, kind)]
     quantities = [parse_quantity(text, kind, where) for text in spelled or [asked]]
     if len({quantity.to_si for quantity in quantities}) > 1:
-        raise BadInput(
-            where, f"one unit for the {kind} column", f"'{asked}' asked for but '{header}' in the file"
-        )
+        raise BadInput(where, f"one unit for the {kind} column", f"'{asked}' asked for but '{header}' in the file")
     return quantities[0]
 
 

@@ -27,11 +27,7 @@ def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:
     span = float(np.ptp(torque_nm))
     at = np.flatnonzero(steps > _GAP_STEPS * usual)
     return [
-        {
-            "at_s": float(time_s[k]),
-            "seconds": float(steps[k]),
-            "torque_share": float(abs(torque_nm[k + 1] - torque_nm[k]) / span),
-        }
+        {"at_s": float(time_s[k]), "seconds": float(steps[k]), "torque_share": float(abs(torque_nm[k + 1] - torque_nm[k]) / span)}
         for k in at[:_MOST_LISTED]
     ]
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-LEVELS = ("error", "warning", "note")
-_MESSAGE_LEVEL = {"note": "info"}
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -28,7 +25,7 @@ class Finding:
 
     def message(self, full: bool = True) -> dict:
         """The form of check.json's ``messages``: level ('info', 'warning', 'error') and text."""
-        return {"level": _MESSAGE_LEVEL.get(self.level, self.level), "text": self.line if full else self.text}
+        return {"level": "info" if self.level == "note" else self.level, "text": self.line if full else self.text}
 
 
 def errors_of(findings) -> list[str]:

@@ -10,9 +10,7 @@ from scipy.optimize import isotonic_regression
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.clock import strictly_rising
-from backdrive_bayes.records.columns import find_column
-from backdrive_bayes.records.plausible import in_si
-from backdrive_bayes.records.readers import read_columns
+from backdrive_bayes.records.columns import read_channels
 
 NOISY_SHARE = 0.02
 BINS_PER_SEGMENT = 100
@@ -20,20 +18,11 @@ BINS_PER_SEGMENT = 100
 
 def read_history(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and torque [N·m], shape (samples,) each; BadInput names file, row and what was found."""
-    headers: list[str] = []
-    quantities: list = []
-
-    def choose(found_headers):
-        found = [find_column(found_headers, kind, None, str(path)) for kind in ("time", "torque")]
-        headers[:], quantities[:] = zip(*found, strict=True)
-        return list(headers)
-
-    columns = read_columns(path, choose)
-    time, torque = in_si(path, columns, headers, quantities)
+    channels = read_channels(path, ("time", "torque"), {})
+    time, torque = channels.values.values()
     if time.size < 2:
         raise BadInput(path, "a history of at least two samples", f"{time.size}")
-    time, _ = strictly_rising(time, columns.first_row, str(path))
-    return time, torque
+    return strictly_rising(time, channels.first_row, str(path))[0], torque
 
 
 def noise_free_torque(time_s, torque_nm) -> tuple[np.ndarray, bool]:

@@ -7,8 +7,6 @@ import math
 from backdrive_bayes.records.faults import stands_still
 from backdrive_bayes.records.findings import Finding
 
-_ARCMIN = 10800.0 / math.pi
-
 
 def judge_record(found: dict, rated_torque_nm: float):
     """Findings on what ``check_record`` found of one record's channels, declared values and closure."""
@@ -25,12 +23,9 @@ def _time(found, _):
     gaps = found["gaps"]
     if gaps:
         worst = max(gaps, key=lambda gap: gap["torque_share"])
-        level = "error" if worst["torque_share"] > 0.1 else "warning"
-        yield Finding(
-            level, "gap",
-            f"{len(gaps)} gap{'s'[: len(gaps) != 1]} in time; the worst, {worst['seconds']:.3g} s at "
-            f"{worst['at_s']:.4g} s, skips {worst['torque_share']:.1%} of the torque range",
-        )
+        place = f"{worst['seconds']:.3g} s at {worst['at_s']:.4g} s, skips {worst['torque_share']:.1%} of the torque range"
+        text = f"{len(gaps)} gap{'s'[: len(gaps) != 1]} in time; the worst, {place}"
+        yield Finding("error" if worst["torque_share"] > 0.1 else "warning", "gap", text)
     if not found["sampling"]["regular"]:
         yield Finding("note", "uneven_sampling", f"sampling is uneven (steps vary by {found['sampling']['irregularity']:.0%})")
     fewest = min(branch["samples"] for branch in found["branches"])
@@ -40,32 +35,22 @@ def _time(found, _):
 
 def _channels(found, _):
     for channel, other in (("torque", "angle"), ("angle", "torque")):
-        wild = found["drop_outs"][channel]
+        wild, frozen = found["drop_outs"][channel], found["frozen"][channel]
         if wild:
-            level = "error" if wild > 0.02 * found["samples"] else "warning"
-            yield Finding(
-                level, "isolated_samples",
-                f"{wild} isolated {channel} sample{'s'[: wild != 1]} far from the neighbours "
-                f"(drop-outs or spikes)",
-            )
-        frozen = found["frozen"][channel]
+            text = f"{wild} isolated {channel} sample{'s'[: wild != 1]} far from the neighbours (drop-outs or spikes)"
+            yield Finding("error" if wild > 0.02 * found["samples"] else "warning", "isolated_samples", text)
         if stands_still(frozen):
-            yield Finding(
-                "error", "frozen",
-                f"{channel} stands still for {frozen['samples']} samples from sample "
-                f"{frozen['start'] + 1} while {other} passes {frozen['other_share']:.0%} of its range",
-            )
+            text = f"{channel} stands still for {frozen['samples']} samples from sample {frozen['start'] + 1}"
+            yield Finding("error", "frozen", f"{text} while {other} passes {frozen['other_share']:.0%} of its range")
     if (found["angle_quantum_rad"] or 0.0) > found["noise"]["white_rad"]:
-        yield Finding("note", "quantised", f"angle comes in steps of {found['angle_quantum_rad'] * _ARCMIN:.3g}′")
+        yield Finding("note", "quantised", f"angle comes in steps of {_arcmin(found['angle_quantum_rad']):.3g}′")
 
 
 def _plateaus(found, _):
     for plateau in found["plateaus"]:
-        yield Finding(
-            "warning", "plateau",
-            f"torque stays near {plateau['torque_Nm']:.4g} N·m for {plateau['seconds']:.3g} s "
-            f"({plateau['share']:.0%} of that side): it is clipped, saturated or dwells there",
-        )
+        text = f"torque stays near {plateau['torque_Nm']:.4g} N·m for {plateau['seconds']:.3g} s"
+        share = f"{plateau['share']:.0%} of that side"
+        yield Finding("warning", "plateau", f"{text} ({share}): it is clipped, saturated or dwells there")
 
 
 def _declared(found, rated):
@@ -75,42 +60,32 @@ def _declared(found, rated):
     ):
         declared, estimated = found[key]["declared"], found[key]["estimated"]
         if declared is not None and abs(estimated - declared) > tolerance * declared:
-            yield Finding(
-                "warning", "declared", f"declared {what} {declared:.4g} {unit}, but the data show {estimated:.4g} {unit}"
-            )
-    if found["amplitude_Nm"]["estimated"] > 1.2 * rated:
-        yield Finding(
-            "warning", "overload",
-            f"torque reaches ±{found['amplitude_Nm']['estimated']:.4g} N·m, above the rated {rated:.4g} N·m",
-        )
+            text = f"declared {what} {declared:.4g} {unit}, but the data show {estimated:.4g} {unit}"
+            yield Finding("warning", "declared", text)
+    amplitude = found["amplitude_Nm"]["estimated"]
+    if amplitude > 1.2 * rated:
+        yield Finding("warning", "overload", f"torque reaches ±{amplitude:.4g} N·m, above the rated {rated:.4g} N·m")
 
 
 def _size(found, _):
     low, high = found["torque_range_Nm"]
     centre, amplitude = 0.5 * (low + high), 0.5 * (high - low)
     if abs(centre) > max(0.02 * amplitude, 0.5 * found["noise"]["torque_Nm"]):
-        yield Finding(
-            "warning", "off_centre", f"torque runs from {low:.4g} to {high:.4g} N·m: off centre by {centre:.2g} N·m"
-        )
-    noise = math.hypot(found["noise"]["white_rad"], found["noise"]["correlated_rad"])
-    if found["angle_signal_rad"] < 2.0 * noise:
-        yield Finding(
-            "error", "lost_in_noise",
-            f"angle moves {found['angle_signal_rad'] * _ARCMIN:.3g}′ only, "
-            f"not clear of its noise of {noise * _ARCMIN:.2g}′",
-        )
+        yield Finding("warning", "off_centre", f"torque runs from {low:.4g} to {high:.4g} N·m: off centre by {centre:.2g} N·m")
+    noise, moved = math.hypot(found["noise"]["white_rad"], found["noise"]["correlated_rad"]), found["angle_signal_rad"]
+    if moved < 2.0 * noise:
+        text = f"angle moves {_arcmin(moved):.3g}′ only, not clear of its noise of {_arcmin(noise):.2g}′"
+        yield Finding("error", "lost_in_noise", text)
 
 
 def _closure(found, _):
     closure = found["closure"]
     if closure is None:
-        yield Finding(
-            "note", "closure", "the record ends before the loop comes back to a tip: its closure cannot be seen"
-        )
+        yield Finding("note", "closure", "the record ends before the loop comes back to a tip: its closure cannot be seen")
         return
     difference, sd = closure["difference_rad"], closure["sd_rad"]
     place = f"{closure['torque_Nm']:.3g} N·m ({closure['basis']})"
-    text = f"{difference * _ARCMIN:.2g}′ ± {sd * _ARCMIN:.1g}′ at {place}"
+    text = f"{_arcmin(difference):.2g}′ ± {_arcmin(sd):.1g}′ at {place}"
     if abs(difference) > max(3.0 * sd, 0.02 * found["angle_range_rad"]):
         yield Finding("warning", "not_closed", f"the loop does not close: {text}; angle drifts, creeps or ratchets")
     else:
@@ -120,5 +95,8 @@ def _closure(found, _):
 def _noise(found, _):
     noise, amplitude = found["noise"]["torque_Nm"], found["amplitude_Nm"]["estimated"]
     if noise > 0.02 * amplitude > 0.0:
-        share = noise / amplitude
-        yield Finding("note", "torque_noise", f"torque noise is {share:.0%} of the amplitude")
+        yield Finding("note", "torque_noise", f"torque noise is {noise / amplitude:.0%} of the amplitude")
+
+
+def _arcmin(angle_rad: float) -> float:
+    return 60.0 * math.degrees(angle_rad)

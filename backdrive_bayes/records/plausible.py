@@ -7,32 +7,16 @@ import numpy as np
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.branches import Segment, find_segments
 from backdrive_bayes.records.record import Record
-from backdrive_bayes.records.turning import torque_noise
+from backdrive_bayes.records.turning import block_means, torque_noise
 
-_FULL_CYCLE = (
-    1.8  # torque travelled over its peak-to-peak value: 2 in a full cycle, 1.5 in three quarters of one
-)
+_FULL_CYCLE = 1.8  # torque travelled over its peak-to-peak value: 2 in a full cycle, 1.5 in three quarters of one
 _LEAST_SIDE = 0.2  # the smaller of the two peaks against the larger
 _STRAIGHT = 0.02  # misfit of a commanded ramp against straight flanks, as a share of peak-to-peak
 _CURVED_TIMES = 4.0  # how much more the answering channel departs from them
-_LARGEST = 1e60
 _SMALLEST = 1e-30  # N·m, rad
 _SHORTEST_S, _LONGEST_S = 1e-6, 1e9
 _POINTS = 40_000  # enough to count hundreds of cycles
 _SHAPE_POINTS = 4000
-
-
-def in_si(path, columns, headers, quantities) -> list[np.ndarray]:
-    """The columns in s, N·m and rad, shape (samples,) each; BadInput for numbers that no bench writes."""
-    values = []
-    for column, header, quantity in zip(columns.values, headers, quantities, strict=True):
-        # Squares and products of larger numbers overflow.
-        bad = np.flatnonzero(np.abs(column) > _LARGEST)
-        if bad.size:
-            where = f"{path}, row {columns.first_row + bad[0]}, column '{header}'"
-            raise BadInput(where, f"a number below {_LARGEST:g}", f"{column[bad[0]]:.3g}")
-        values.append(column * quantity.to_si)
-    return values
 
 
 def check_plausible(record: Record, rated_torque_nm: float | None, where: str) -> None:
@@ -44,15 +28,14 @@ def check_plausible(record: Record, rated_torque_nm: float | None, where: str) -
     if np.ptp(torque) <= max(1e-9 * float(np.abs(torque).max()), _SMALLEST):
         raise BadInput(f"{where}, torque", "torque that rises and falls", f"constant {torque[0]:.6g} N·m")
     if np.ptp(record.angle_rad) <= _SMALLEST:
-        raise BadInput(
-            f"{where}, angle", "angle that answers the torque", f"constant {record.angle_rad[0]:.6g} rad"
-        )
+        raise BadInput(f"{where}, angle", "angle that answers the torque", f"constant {record.angle_rad[0]:.6g} rad")
     _refuse_swapped(record, rated_torque_nm, where)
 
 
 def why_unfinished(time_s: np.ndarray, torque_nm: np.ndarray) -> str:
     """What keeps a record from holding a full torque cycle, empty where nothing does."""
-    time, torque = _block_means(_POINTS, time_s, torque_nm)
+    block = max(1, len(time_s) // _POINTS)
+    time, torque = block_means(time_s, block), block_means(torque_nm, block)
     segments = find_segments(time, torque)
     levels = _levels(torque, segments)
     travelled, span = float(np.abs(np.diff(levels)).sum()), float(np.ptp(levels))
@@ -89,14 +72,13 @@ def _refuse_swapped(record: Record, rated_torque_nm: float | None, where: str) -
         found = "straight ramps of angle and curves of torque" + (
             f" ({largest:.4g} N·m where {expected:.4g} N·m is declared)" if expected is not None else ""
         )
-        raise BadInput(
-            f"{where}, columns torque and angle", "straight ramps of torque", f"{found}: channels swapped?"
-        )
+        raise BadInput(f"{where}, columns torque and angle", "straight ramps of torque", f"{found}: channels swapped?")
 
 
 def _misfit(time: np.ndarray, values: np.ndarray) -> float:
     """Root-mean-square departure from straight flanks between turning points, as a share of peak-to-peak."""
-    time, values = _block_means(_SHAPE_POINTS, time, values)
+    block = max(1, len(time) // _SHAPE_POINTS)
+    time, values = block_means(time, block), block_means(values, block)
     span = float(np.ptp(values))
     if len(values) < 9 or span == 0.0:
         return np.inf
@@ -107,9 +89,3 @@ def _misfit(time: np.ndarray, values: np.ndarray) -> float:
             line = np.polyfit(x - x.mean(), y, 1)
             squares += float(np.sum((y - np.polyval(line, x - x.mean())) ** 2))
     return float(np.sqrt(squares / len(values))) / span
-
-
-def _block_means(points: int, *arrays: np.ndarray) -> list[np.ndarray]:
-    step = max(1, len(arrays[0]) // points)
-    count = len(arrays[0]) // step
-    return [array[: count * step].reshape(count, step).mean(axis=1) for array in arrays]

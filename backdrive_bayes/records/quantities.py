@@ -1,4 +1,4 @@
-"""Column names of a bench: which quantity they hold and in which unit."""
+"""Column names of a bench: which quantity they hold and in which unit; names common in several languages are known."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 from backdrive_bayes.errors import BadInput
 
-_TURN = 2.0 * math.pi
-_DEG = math.pi / 180.0
+_DEG = math.radians(1.0)
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "torque": {"Nm": 1.0, "mNm": 1e-3, "uNm": 1e-6, "kNm": 1e3, "Ncm": 1e-2, "Nmm": 1e-3},
@@ -24,11 +23,19 @@ UNITS: dict[str, dict[str, float]] = {
         "'": _DEG / 60.0,
         "arcsec": _DEG / 3600.0,
         '"': _DEG / 3600.0,
-        "rev": _TURN,
+        "rev": math.tau,
     },
 }
 BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
 _SPELLED_ALIKE = str.maketrans({"µ": "u", "μ": "u", "′": "'", "’": "'", "″": '"', "”": '"', "º": "°"})
+_NAMES = {
+    "time": "time t zeit zeitstempel messzeit timestamp elapsed temps tiempo tempo tijd čas 时间 時間 时刻",
+    "torque": "torque drehmoment moment m md mz m_out m_ab abtriebsmoment lastmoment couple par momento coppia koppel tau τ "
+    "load output_torque torque_out load_torque 扭矩 转矩 力矩 トルク",
+    "angle": "angle winkel drehwinkel verdrehwinkel abtriebswinkel verdrehung phi φ ϕ theta θ rotation encoder position "
+    "angolo angulo ángulo hoek angle_de_rotation output_angle angle_out twist 角度 转角 回転角",
+}
+_KNOWN = {kind: frozenset(words.split()) for kind, words in _NAMES.items()}
 
 
 @dataclass(frozen=True)
@@ -54,9 +61,7 @@ def parse_quantity(spelling: str, kind: str, where: str) -> Quantity:
     factor = UNITS[kind].get(canonical(unit)) if unit else None
     if factor is None:
         raise BadInput(
-            where,
-            f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix or in brackets",
-            f"'{spelling}'{suggestion(unit, kind)}",
+            where, f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix or in brackets", f"'{spelling}'{suggestion(unit, kind)}"
         )
     return Quantity(name, canonical(unit), factor)
 
@@ -94,3 +99,15 @@ def suggestion(unit: str, kind: str) -> str:
     near = [known for known in UNITS[kind] if known.casefold() == unit.casefold()]
     near = near or difflib.get_close_matches(unit, UNITS[kind], n=1)
     return f" (did you mean {near[0]}?)" if unit and near else ""
+
+
+def is_named(name: str, kind: str) -> bool:
+    """Whether a header's plain name is a common one of that kind of channel; groups before a slash do not count."""
+    last = name.strip().rpartition("/")[2].strip()
+    folded = re.sub(r"[\s.\-]+", "_", last.casefold()).strip("_")
+    known = _KNOWN[kind]
+    if folded in known:
+        return True
+    # "Drehmoment Abtrieb", "Winkel 1": the first word of several decides where it is a long one.
+    first = folded.split("_")[0]
+    return len(first) > 3 and first in known

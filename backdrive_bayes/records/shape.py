@@ -25,9 +25,7 @@ def turning_levels(torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> np.n
 
 def extremes(torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> tuple[float, float]:
     """Lowest and highest torque in N·m between which the full cycles run."""
-    levels = np.append(
-        turning_levels(torque_nm, segments), [np.median(torque_nm[:5]), np.median(torque_nm[-5:])]
-    )
+    levels = _levels(torque_nm, segments)
     high, low = levels.max(), levels.min()
     return (
         float(np.median(levels[levels <= low + (1 - _FULL) * abs(low)])),
@@ -39,10 +37,7 @@ def loading_rate(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segm
     """Median rate in N·m/s of the segments' middle parts, each weighted by its length."""
     rates, weights = [], []
     for segment in segments:
-        time, torque = (
-            time_s[segment.start : segment.stop],
-            segment.direction * torque_nm[segment.start : segment.stop],
-        )
+        time, torque = (time_s[segment.start : segment.stop], segment.direction * torque_nm[segment.start : segment.stop])
         low, high = np.percentile(torque, [2, 98])
         start, stop = (int(np.count_nonzero(torque < low + share * (high - low))) for share in (0.2, 0.8))
         if stop - start > 2:
@@ -57,13 +52,13 @@ def loading_rate(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segm
 
 def cycle_count(torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
     """Torque travelled over that of one full cycle."""
-    ends = [
-        float(np.median(torque_nm[:5])),
-        *turning_levels(torque_nm, segments),
-        float(np.median(torque_nm[-5:])),
-    ]
     low, high = extremes(torque_nm, segments)
-    return float(np.abs(np.diff(ends)).sum() / (2.0 * (high - low))) if high > low else 0.0
+    return float(np.abs(np.diff(_levels(torque_nm, segments))).sum() / (2.0 * (high - low))) if high > low else 0.0
+
+
+def _levels(torque: np.ndarray, segments: tuple[Segment, ...]) -> np.ndarray:
+    """Torque at the record's start, its turning points and its end."""
+    return np.r_[np.median(torque[:5]), turning_levels(torque, segments), np.median(torque[-5:])]
 
 
 def closure(time_s, torque_nm, angle_rad, branches: tuple[Branch, ...], noise) -> dict | None:
@@ -118,18 +113,14 @@ class _Tip:
 def _tips(time, torque, angle, branches: tuple[Branch, ...]) -> list[_Tip]:
     found = [_tip(time, torque, angle, branch) for branch in branches if branch.label.startswith("load")]
     tips = [tip for tip in found if tip is not None]
-    largest = {
-        sign: max((abs(tip.torque_nm) for tip in tips if tip.label[-1] == sign), default=0.0) for sign in "+-"
-    }
+    largest = {sign: max((abs(tip.torque_nm) for tip in tips if tip.label[-1] == sign), default=0.0) for sign in "+-"}
     return [tip for tip in tips if abs(tip.torque_nm) >= 0.95 * largest[tip.label[-1]]]
 
 
 def _tip(time, torque, angle, branch: Branch) -> _Tip | None:
     count = branch.stop - branch.start
     level = float(np.median(torque[branch.stop - min(max(3, count // 200), count) : branch.stop]))
-    near = branch.start + np.flatnonzero(
-        np.abs(torque[branch.start : branch.stop]) >= (1 - _TIP) * abs(level)
-    )
+    near = branch.start + np.flatnonzero(np.abs(torque[branch.start : branch.stop]) >= (1 - _TIP) * abs(level))
     if len(near) < 4 or np.ptp(torque[near]) == 0.0:
         return None
     slope, at_tip = np.polyfit(torque[near] - level, angle[near], 1)

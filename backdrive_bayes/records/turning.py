@@ -10,9 +10,7 @@ _MAIN_SHARE = 0.35  # reversals of this share set the length of a typical segmen
 _NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the smoothed noise is noise
 _BLOCKS_PER_SEGMENT = 64
 _LINE_POINTS = 2000  # block means lose nothing of a straight line
-_MEDIAN_BLOCKS = (
-    9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
-)
+_MEDIAN_BLOCKS = 9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
 
 
 def torque_noise(torque_nm: np.ndarray) -> float:
@@ -20,17 +18,9 @@ def torque_noise(torque_nm: np.ndarray) -> float:
     if len(torque_nm) < 3:
         return 0.0
     # second differences: the ramp itself drops out; twenty thousand of them tell the median to a percent
-    second = (
-        torque_nm[2:] - 2.0 * torque_nm[1:-1] + torque_nm[:-2]
-        if len(torque_nm) < 40_000
-        else _thinned(torque_nm)
-    )
+    at = np.arange(0, len(torque_nm) - 2, max(1, len(torque_nm) // 20_000))
+    second = torque_nm[at + 2] - 2.0 * torque_nm[at + 1] + torque_nm[at]
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0))
-
-
-def _thinned(torque: np.ndarray) -> np.ndarray:
-    at = np.arange(0, len(torque) - 2, len(torque) // 20_000)
-    return torque[at + 2] - 2.0 * torque[at + 1] + torque[at]
 
 
 def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
@@ -47,7 +37,7 @@ def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
     if not span > 4.0 * noise / np.sqrt(window):
         return []
     block = max(1, _segment_length(smooth, span) // _BLOCKS_PER_SEGMENT)
-    blocks = median_filter(_block_means(torque_nm, block), _MEDIAN_BLOCKS if block > 1 else 5, mode="nearest")
+    blocks = median_filter(block_means(torque_nm, block), _MEDIAN_BLOCKS if block > 1 else 5, mode="nearest")
     threshold = max(SHARE * float(np.ptp(blocks)), _NOISE_MULTIPLE * noise / np.sqrt(block))
     return [k * block + block // 2 for k in _zigzag(blocks.tolist(), threshold)]
 
@@ -97,7 +87,8 @@ def _segment_length(smooth: np.ndarray, span: float) -> int:
     return int(lengths[np.searchsorted(np.cumsum(lengths), 0.1 * len(smooth))])
 
 
-def _block_means(values: np.ndarray, block: int) -> np.ndarray:
+def block_means(values: np.ndarray, block: int) -> np.ndarray:
+    """Means of blocks of so many samples each; what is left over at the end is left out."""
     count = max(len(values) // block, 1)
     return values[: count * block].reshape(count, -1).mean(axis=1)
 
@@ -171,7 +162,7 @@ def _percentile(values: np.ndarray, percent):
 def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     """Line (time origin, level there, slope) through the samples, outliers trimmed once."""
     block = max(1, len(x) // _LINE_POINTS)
-    x, y = _block_means(x, block), _block_means(y, block)
+    x, y = block_means(x, block), block_means(y, block)
     origin = float(x.mean())
     level, slope = _least_squares(x - origin, y)
     residual = np.abs(y - level - slope * (x - origin))

@@ -9,18 +9,16 @@ import numpy as np
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.clock import strictly_rising
-from backdrive_bayes.records.columns import find_column, spelling
+from backdrive_bayes.records.columns import DEFAULT_COLUMNS, read_channels
 from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild
-from backdrive_bayes.records.plausible import check_plausible, in_si
-from backdrive_bayes.records.readers import READERS, read_columns, record_suffix
-from backdrive_bayes.records.readers.limits import Columns
+from backdrive_bayes.records.plausible import check_plausible
+from backdrive_bayes.records.readers import READERS, record_suffix
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.unit_toml import FILE_NAME, RecordEntry, read_unit_toml
 from backdrive_bayes.records.wraps import unwrapped
 
 FEWEST_READ = 24
 """Samples below which no ramp, branch or noise can be told at all."""
-_KINDS = ("time", "torque", "angle")
 
 
 def read_unit(path: Path | str) -> Unit:
@@ -64,44 +62,17 @@ def _read_bare(path: Path) -> Unit:
 
 
 def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
-    headers: list[str] = []
-    quantities: list = []
-
-    def choose(found_headers: tuple[str, ...]) -> list[str]:
-        found = [find_column(found_headers, kind, entry.columns.get(kind), str(entry.path)) for kind in _KINDS]
-        _refuse_shared(entry.path, [header for header, _ in found])
-        headers[:], quantities[:] = zip(*found, strict=True)
-        return list(headers)
-
-    columns = read_columns(entry.path, choose)
-    _check_length(entry.path, columns)
-    time, torque, angle = in_si(entry.path, columns, headers, quantities)
-    time, clock = strictly_rising(time, columns.first_row, str(entry.path))
+    channels = read_channels(entry.path, DEFAULT_COLUMNS, entry.columns)
+    time, torque, angle = channels.values.values()
+    if time.size < FEWEST_READ:
+        raise BadInput(entry.path, f"a record of {FEWEST_READ} samples or more", f"{time.size} sample{'s'[: time.size != 1]}")
+    time, clock = strictly_rising(time, channels.first_row, str(entry.path))
     angle, wraps = unwrapped(torque, angle)
-    record = Record(
-        entry.name,
-        time,
-        torque,
-        angle,
-        entry.loading_rate_nm_per_s,
-        entry.amplitude_nm,
-        (*columns.notes, *(quantity.note for quantity in quantities if quantity.note), *clock, *wraps),
-        dict(zip(_KINDS, map(spelling, headers, quantities), strict=True)),
-        _sha256(entry.path),
-    )
+    declared = (entry.loading_rate_nm_per_s, entry.amplitude_nm)
+    notes = (*channels.notes, *clock, *wraps)
+    record = Record(entry.name, time, torque, angle, *declared, notes, channels.spelling, _sha256(entry.path))
     check_plausible(record, rated_torque_nm, str(entry.path))
     return record
-
-
-def _refuse_shared(path: Path, headers: list[str]) -> None:
-    if len(set(headers)) < len(headers):
-        raise BadInput(path, "three different columns for time, torque and angle", ", ".join(headers))
-
-
-def _check_length(path: Path, columns: Columns) -> None:
-    count = len(columns.values[0])
-    if count < FEWEST_READ:
-        raise BadInput(path, f"a record of {FEWEST_READ} samples or more", f"{count} sample{'s'[: count != 1]}")
 
 
 def _sha256(path: Path) -> str:

@@ -71,9 +71,7 @@ def _inside(where: str, folder: Path, name: str) -> Path:
     try:
         target = (folder / relative).resolve()
         if not target.is_relative_to(folder.resolve()):
-            raise BadInput(
-                f"{where}, key file", "a path inside the unit folder", f"'{name}', a link that leaves it"
-            )
+            raise BadInput(f"{where}, key file", "a path inside the unit folder", f"'{name}', a link that leaves it")
         if not target.exists():
             raise BadInput(f"{where}, key file", f"a file '{name}' in the unit folder", "nothing there")
     except BadInput:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-TURN_RAD = 2.0 * math.pi
+TURN_RAD = math.tau
 LARGEST_STEP_RAD = 0.25 * TURN_RAD
 """No encoder on a loaded output turns further between two samples."""
 _NEAR_TURN = 0.1  # a jump within this share of a full turn is one
@@ -28,7 +28,7 @@ def unwrapped(torque_nm: np.ndarray, angle_rad: np.ndarray) -> tuple[np.ndarray,
     if not jumps.size:
         return angle_rad, ()
     size = np.abs(np.diff(angle_rad)[jumps])
-    if np.all(np.abs(size - TURN_RAD) < _NEAR_TURN * TURN_RAD):
+    if _near_turns(size):
         period, what = TURN_RAD, "a full turn"
     elif _is_modulus(torque_nm, angle_rad, jumps, size):
         period = _modulus(angle_rad, jumps)
@@ -45,17 +45,17 @@ def find_jumps(angle_rad: np.ndarray) -> np.ndarray:
     None where all come back within a few samples: those are drop-outs or spikes, unless they are full turns.
     """
     steps = np.abs(np.diff(angle_rad))
-    least = max(_JUMP_SHARE * float(np.ptp(angle_rad)), _JUMP_TIMES * _usual_step(angle_rad))
+    least = max(_JUMP_SHARE * float(np.ptp(angle_rad)), _JUMP_TIMES * float(np.median(steps)))
     jumps = np.flatnonzero(steps > least)
-    if not jumps.size or np.all(np.abs(steps[jumps] - TURN_RAD) < _NEAR_TURN * TURN_RAD):
+    if not jumps.size or _near_turns(steps[jumps]):
         return jumps
     lasting = np.r_[jumps[1:], len(angle_rad)] - jumps > _BRIEF_SAMPLES
     spikes = jumps.size % 2 == 0 and not lasting[::2].any()
     return jumps[:0] if spikes else jumps
 
 
-def _usual_step(angle: np.ndarray) -> float:
-    return float(np.median(np.abs(np.diff(angle))))
+def _near_turns(sizes: np.ndarray) -> bool:
+    return bool(np.all(np.abs(sizes - TURN_RAD) < _NEAR_TURN * TURN_RAD))
 
 
 def _taken_out(angle: np.ndarray, jumps: np.ndarray, period: float) -> np.ndarray:

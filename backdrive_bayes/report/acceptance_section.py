@@ -35,7 +35,7 @@ _GLOBAL = (
 def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``accept`` and lay out its pages."""
     verdict = read_result(Path(folder) / "verdict.json", VERDICT)
-    figures = verdict_figures(verdict)
+    figures, fitted = verdict_figures(verdict), (Path(folder) / "posterior.nc").exists()
     name, first = free(verdict["unit"], 80), next(iter(figures))
     pictures = [Picture(n, caption(n)) for n in figures if n != first]
     return Chapter(
@@ -53,8 +53,11 @@ def chapter(folder: Path) -> Chapter:
         [Picture(first, caption(first), spilt=True), *_more(verdict), *pictures],
         figures,
         terms=[
-            Heading("Acceptance"), Paragraph(_RULE), *([Paragraph(_GLOBAL)] if _global(verdict) else []), _basis(verdict),
-        ],  # fmt: skip
+            Heading("Acceptance"),
+            Paragraph(_RULE),
+            *([Paragraph(_GLOBAL)] if _global(verdict) else []),
+            _basis(verdict, in_full=not fitted),
+        ],
         outcome=", ".join(filter(None, [_outcome(verdict), warned(verdict)])),
         provisional=not verdict["convergence"]["converged"],
     )
@@ -204,22 +207,17 @@ def _process(process, factor):
     return f"{like_interval(process['mean'], spread, factor)} ± {like_interval(process['sd'], spread, factor)}"
 
 
-def _basis(verdict):
-    """Models, convergence and reproduction of a verdict in a note."""
+def _basis(verdict, in_full):
+    """Models, convergence and reproduction of a verdict in a note, digests ``in_full`` where no fit's chapter holds them."""
     found, fit = verdict["convergence"], verdict["reproduction"]
     models = "; ".join(f"{_model(m)} {probability_text(m['probability'])}" for m in verdict["structure"]["models"])
     sampling = "converged" if found["converged"] else "NOT converged"
     numbers = f"largest R-hat {significant(found['max_rhat'], 4)}, smallest tail ESS {significant(found['min_tail_ess'], 4)}"
-    made = "".join(f" {name}: {_text(fit[key])}." for name, key in _REPRODUCTION if fit.get(key) is not None)
+    made = f" Seed: {fit['seed']}." if fit.get("seed") is not None else ""
+    if in_full and fit.get("data_sha256"):
+        made += f" Data, SHA-256: {', '.join(fit['data_sha256'])}."
     return Note(f"{free(verdict['unit'], 80)}. Model: {models}; {sampling}: {numbers}.{made}")
 
 
 def _model(model):
     return " + ".join(free(words(m)) for m in [*model["modules"], *model["effects"]])
-
-
-def _text(value):
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-_REPRODUCTION = (("Seed", "seed"), ("Data, SHA-256", "data_sha256"))

@@ -25,8 +25,8 @@ def chapter(folder: Path) -> Chapter:
     figures = comparison_figures(result)
     level = result["level"]
     title = free("Comparison: " + ", ".join(result["names"]), 110)
-    on_summary = [n for n in ("comparison-loops", "comparison-mechanism") if n in figures]
-    rest = [Picture(n, caption(n, level)) for n in figures if n.startswith("comparison-ratios")]
+    kinds = ("comparison-loops", "comparison-ratios", "comparison-mechanism")
+    names = [n for kind in kinds for n in figures if n.startswith(kind)]
     return Chapter(
         title,
         [
@@ -35,12 +35,11 @@ def chapter(folder: Path) -> Chapter:
             *findings_blocks(result),
             _identity(result),
             *_key_tables(result),
-            *(Picture(n, caption(n, level)) for n in on_summary),
+            *(Picture(n, caption(n, level)) for n in names),
             Signature(["Reviewed by", "Date", "Signature"]),
         ],
         [
-            *(Picture(n, caption(n, level), spilt=True) for n in on_summary),
-            *rest,
+            *(Picture(n, caption(n, level), spilt=True) for n in names),
             *_refused(result),
             *_reproduction(result),
         ],
@@ -72,8 +71,8 @@ def _banner(result):
     clear = sum(r["verdict"] in ("greater", "less") for r in rows)
     same = sum(r["verdict"] == "equivalent" for r in rows)
     text = (
-        f"Of {len(rows)} comparisons of an indicator at one rate and amplitude, {clear} differ clearly, {same} are equivalent "
-        f"within ±{100 * result['rope']:.3g} % and {len(rows) - clear - same} are undecided, each at a probability of "
+        f"Comparisons of an indicator at one rate and amplitude: {len(rows)}. Clearly different: {clear}; equivalent within "
+        f"±{100 * result['rope']:.3g} %: {same}; undecided: {len(rows) - clear - same}; each at a probability of "
         f"{100 * result['clear']:.3g} %."
     )
     return Banner("good", "COMPARED at matched rate and amplitude", text)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.bench.plan import make_plan
+from backdrive_bayes.bench.registry import MEMBERS
 from backdrive_bayes.bench.unit import draw_unit
 from backdrive_bayes.blind.drawing import assignments, draw_and_write
 from backdrive_bayes.blind.key import folder_digest
-from backdrive_bayes.blind.request import BASELINE_OWN, CLASSES, LISTED, Request
-from backdrive_bayes.blind.truth_map import BRANCHES, branch_index, true_map
-from backdrive_bayes.blind.where import overlap
+from backdrive_bayes.blind.request import CLASSES, LISTED, Request
+from backdrive_bayes.blind.where import BRANCHES, branch_index, overlap, true_map
 from backdrive_bayes.errors import BadInput
 
 PLAN = make_plan((1.0, 5.0), sampling_hz=200.0)
@@ -24,7 +24,7 @@ def test_every_class_and_severity_is_dealt_evenly_and_in_random_order():
     assert kinds["none"] == kinds["unknown"] == 60 and kinds["pair"] == 40
     cells = Counter(tuple(e.items()) for e in effects if len(e) == 1 and "unknown" not in e)
     assert len(cells) == 4 * len(LISTED) and set(cells.values()) == {6}
-    assert not any(name in BASELINE_OWN for e in effects for name in e)
+    assert not any(name in MEMBERS for e in effects for name in e)
     assert effects == assignments(Request(400)) != assignments(Request(400, seed=1))
 
 

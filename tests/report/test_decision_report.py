@@ -6,6 +6,7 @@ import re
 
 import pypdf
 import pytest
+from matplotlib.figure import Figure
 from support.decided import diagnosis, evidence
 from support.told import told
 
@@ -18,7 +19,7 @@ from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.number_text import interval_text, probability_text
 from backdrive_bayes.report import report, sections
-from backdrive_bayes.report.blocks import Chapter, Heading, Paragraph
+from backdrive_bayes.report.blocks import Chapter, Heading, Paragraph, Picture
 from backdrive_bayes.report.claims_section import _count, _number
 from backdrive_bayes.results import COMPARISON, read_result
 
@@ -144,6 +145,17 @@ def test_a_series_that_is_nothing_at_its_ends_is_not_a_wall_of_digits():
     curve = {"unit": "rad", "median": [1e-249, 0.03, 1e-200], "at": ""}
     assert _number(curve) == "0 to 0, at most 103 arcmin"
     assert _number({"unit": "N·m", "median": 0.0957757, "lo": 0.09577, "hi": 0.095783}) == "95.776 [95.770, 95.783] mN·m"
+
+
+def test_a_summary_bears_as_many_pictures_as_have_room(monkeypatch, tmp_path):
+    names = ("first", "second", "third")
+    summary = [Heading("c", 1), *(Picture(n, f"caption of the {n}") for n in names)]
+    details = [Picture(n, f"caption of the {n}", spilt=True) for n in names]
+    made = [Chapter("c", summary, details, {n: Figure(figsize=(6.7, 3.6)) for n in names})]
+    monkeypatch.setattr(sections, "chapters", lambda folder: made)
+    text, _ = pages(tmp_path)
+    assert re.findall(r"caption of the (\w+)", text[0]) == ["first", "second"]
+    assert re.findall(r"caption of the (\w+)", " ".join(text[1:])) == ["third"]
 
 
 def test_a_chapter_does_not_begin_at_the_foot_of_a_page(monkeypatch, tmp_path):

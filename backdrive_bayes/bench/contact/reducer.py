@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from backdrive_bayes.bench.contact.chain import Chain, contact_stiffness
+from backdrive_bayes.bench.draws import scattered
 
 BRISTLES = 7
 IN_PROPORTION = (
@@ -104,7 +105,7 @@ def _sequence(ratio, stages):
 
 
 def _levels(spread, stages, count):
-    # Golden-ratio sequence: scattered over a stage's flanks and different from stage to stage, yet the same at every call.
+    # Scattered over a stage's flanks and different from stage to stage.
     k = np.arange(stages * count).reshape(stages, count)
-    level = np.exp(spread * ndtri((0.5 + 0.6180339887498949 * k) % 1.0))
+    level = np.exp(spread * ndtri(scattered(k)))
     return level / level.mean(axis=1, keepdims=True)

@@ -35,17 +35,8 @@ def sliders(torque_nm, half_width_nm):
 
     ``torque_nm`` has shape (steps,), ``half_width_nm`` (steps, elements): what a slider holds back.
     """
-    return _slide(torque_nm, np.ascontiguousarray(half_width_nm))
-
-
-@njit(cache=True)
-def _slide(drive, half_width):
-    held, place = np.empty_like(half_width), np.zeros(half_width.shape[1])
-    for k in range(half_width.shape[0]):
-        for j in range(half_width.shape[1]):
-            place[j] = min(max(place[j], drive[k] - half_width[k, j]), drive[k] + half_width[k, j])
-            held[k, j] = place[j]
-    return held
+    drive = torque_nm[:, None]
+    return drag_between(drive - half_width_nm, drive + half_width_nm, 0.0)
 
 
 def gaps(torque_nm, drag_nm, centre_nm, rise_nm, fall_nm, start=0.0):
@@ -54,21 +45,9 @@ def gaps(torque_nm, drag_nm, centre_nm, rise_nm, fall_nm, start=0.0):
     A part crosses when the torque passes ``centre ± drag``, over a range ±``rise`` upwards and ±``fall`` downwards (film, tooth
     flexure); all [N·m], drag of shape (steps, elements), the others (elements,). ``start`` is where the parts float at first.
     """
-    place = np.array(np.broadcast_to(start, centre_nm.shape), float)
-    return _cross(torque_nm, np.ascontiguousarray(drag_nm), centre_nm, rise_nm, fall_nm, place)
-
-
-@njit(cache=True)
-def _cross(torque, drag, centre, rise, fall, place):
-    moved = np.empty_like(drag)
-    for k in range(drag.shape[0]):
-        for j in range(drag.shape[1]):
-            drive = torque[k] - centre[j]
-            lower = min(max((drive - drag[k, j]) / rise[j], -1.0), 1.0)
-            upper = min(max((drive + drag[k, j]) / fall[j], -1.0), 1.0)
-            place[j] = min(max(place[j], lower), upper)
-            moved[k, j] = place[j]
-    return moved
+    drive = torque_nm[:, None] - centre_nm
+    lower, upper = (drive - drag_nm) / rise_nm, (drive + drag_nm) / fall_nm
+    return drag_between(np.clip(lower, -1.0, 1.0), np.clip(upper, -1.0, 1.0), start)
 
 
 def stops(torque_nm, stop_nm, share):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
-from backdrive_bayes.bench.draws import log_uniform
+from backdrive_bayes.bench.draws import log_uniform, scattered
 from backdrive_bayes.bench.sliders import elements
 
 SLIDERS = 192
@@ -100,7 +100,7 @@ class BenchReducer:
 def slider_levels(spread: float):
     """Constant and load-proportional friction of the sliders over their means, two arrays of shape (elements,)."""
     k = np.arange(SLIDERS)
-    first, second = (k + 0.5) / SLIDERS, (0.5 + 0.6180339887498949 * k) % 1.0
+    first, second = (k + 0.5) / SLIDERS, scattered(k)
     levels = [np.exp(spread * ndtri(u)) for u in (first, second)]
     return tuple(level / level.mean() for level in levels)
 

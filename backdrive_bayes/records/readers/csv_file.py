@@ -54,10 +54,7 @@ def read(path: Path, choose: Choose) -> Columns:
         values, even = _parse(path, dialect, wanted)
     except BadInput:
         raise
-    except (
-        ValueError,
-        OverflowError,
-    ) as error:  # the parser's errors are ValueErrors and do not name the row
+    except (ValueError, OverflowError) as error:  # the parser's errors are ValueErrors and do not name the row
         fallback = BadInput(path, "columns of finite numbers", str(error))
         raise culprit(path, dialect, wanted) or fallback from error
     finite = all(np.isfinite(value).all() for value in values)

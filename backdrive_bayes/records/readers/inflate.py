@@ -36,9 +36,7 @@ class BoundedStream(io.RawIOBase):
         try:
             chunk = self._stream.read(min(len(buffer), 1 << 20))
         except BROKEN as error:
-            raise BadInput(
-                self._path, "an intact compressed file", str(error) or type(error).__name__
-            ) from error
+            raise BadInput(self._path, "an intact compressed file", str(error) or type(error).__name__) from error
         self._count += len(chunk)
         self._check()
         self.seen += chunk.count(self._mark)
@@ -54,7 +52,7 @@ class BoundedStream(io.RawIOBase):
 
     def _check(self) -> None:
         bomb = self._count > limits.FREE_INFLATED_BYTES and self._count > limits.MAX_INFLATION * self._size
-        if bomb or self._count > limits.MAX_INFLATED_BYTES:
+        if bomb or self._count > limits.MAX_BYTES:
             raise BadInput(
                 self._path,
                 f"at most 2 GB, and {limits.MAX_INFLATION} times the file's size, once inflated",

@@ -12,12 +12,13 @@ import numpy as np
 
 from backdrive_bayes.errors import BadInput
 
-MAX_FILE_BYTES = 2_000_000_000
-MAX_INFLATED_BYTES = 2_000_000_000
+MAX_BYTES = 2_000_000_000
+"""Of a file, and of what it inflates to."""
 MAX_ROWS = 20_000_000
-# Real records of text shrink three- to tenfold; a bomb of zeros shrinks a thousandfold.
-MAX_INFLATION = 150
-FREE_INFLATED_BYTES = 50_000_000
+MAX_INFLATION, FREE_INFLATED_BYTES = 150, 50_000_000
+"""Beyond so many bytes: real records of text shrink three- to tenfold, a bomb of zeros shrinks a thousandfold."""
+MOST_DEPTH, MOST_ARRAYS = 4, 5000
+"""Of a MATLAB file: structures within structures, and arrays in all."""
 
 Choose = Callable[[tuple[str, ...]], Sequence[str]]
 
@@ -39,7 +40,7 @@ def check_file_size(path: Path) -> None:
         raise BadInput(path, "a readable file", _reason(error)) from error
     if not stat.S_ISREG(status.st_mode):
         raise BadInput(path, "a regular file", "a folder" if path.is_dir() else "something else")
-    if status.st_size > MAX_FILE_BYTES:
+    if status.st_size > MAX_BYTES:
         raise BadInput(path, "a file of at most 2 GB", f"{status.st_size / 1e9:.1f} GB")
     if status.st_size == 0:
         raise BadInput(path, "a table of samples", "an empty file")
@@ -69,9 +70,7 @@ def finite_columns(path: Path, headers: Sequence[str], arrays: Sequence, word: s
     for header, value in zip(headers, values, strict=True):
         bad = np.flatnonzero(~np.isfinite(value))
         if bad.size:
-            raise BadInput(
-                f"{path}, {word} {bad[0] + 1}, column '{header}'", "a finite number", f"{value[bad[0]]}"
-            )
+            raise BadInput(f"{path}, {word} {bad[0] + 1}, column '{header}'", "a finite number", f"{value[bad[0]]}")
     return Columns(values)
 
 
@@ -83,8 +82,4 @@ def _as_float(path: Path, header: str, array) -> np.ndarray:
 
 
 def _reason(error: Exception) -> str:
-    return (
-        "nothing there"
-        if isinstance(error, FileNotFoundError)
-        else getattr(error, "strerror", None) or str(error)
-    )
+    return "nothing there" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", None) or str(error)

@@ -20,7 +20,6 @@ _ORDERS = {b"IM": "<", b"MI": ">"}
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _MATRIX, _COMPRESSED = 14, 15
 _STRUCT, _NUMERIC, _COMPLEX = 2, range(6, 16), 0x0800
-_MOST_DEPTH, _MOST_LEAVES = 4, 5000
 _NOTHING = memoryview(b"")
 
 
@@ -53,7 +52,7 @@ def leaves(data: bytes) -> list[Leaf]:
     found: list[Leaf] = []
     for kind, content in _elements(memoryview(data)[HEADER_BYTES:], order):
         if kind == _COMPRESSED:
-            whole = _inflated(content, limits.MAX_INFLATED_BYTES - inflated)
+            whole = _inflated(content, limits.MAX_BYTES - inflated)
             inflated += len(whole)
             kind, content = next(_elements(whole, order), (0, whole))
         if kind == _MATRIX:
@@ -97,14 +96,14 @@ def _collect(view: memoryview, order: str, prefix: str, depth: int, found: list[
         raise ValueError("a matrix without flags, dimensions or name")
     flags, shape = int(np.frombuffer(head[0][:4], f"{order}u4")[0]), _shape(head[1], order)
     name, kind = prefix + bytes(head[2]).decode("utf-8", "replace"), flags & 0xFF
-    if kind == _STRUCT and math.prod(shape) == 1 and depth < _MOST_DEPTH:
+    if kind == _STRUCT and math.prod(shape) == 1 and depth < limits.MOST_DEPTH:
         _collect_fields(parts, order, name, depth, found)
     elif kind in _NUMERIC and not flags & _COMPLEX:
         number, content = next(parts, (0, _NOTHING))
         if number in _NUMBERS and len(content) % np.dtype(_NUMBERS[number]).itemsize == 0:
             found.append(Leaf(name, shape, order + _NUMBERS[number], content))
-    if len(found) > _MOST_LEAVES:
-        raise ValueError(f"more than {_MOST_LEAVES} arrays")
+    if len(found) > limits.MOST_ARRAYS:
+        raise ValueError(f"more than {limits.MOST_ARRAYS} arrays")
 
 
 def _shape(content: memoryview, order: str) -> tuple[int, ...]:

@@ -6,12 +6,10 @@ import math
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.records.readers.limits import Choose, Columns, check_rows, finite_columns
+from backdrive_bayes.records.readers.limits import MOST_ARRAYS, MOST_DEPTH, Choose, Columns, check_rows, finite_columns
 from backdrive_bayes.records.readers.mat5 import is_level_5, leaves
 
 _HDF5_MARK_AT = 512  # version 7.3 is HDF5 behind a 512-byte MATLAB header
-_MOST_DEPTH = 4  # structures within structures
-_MOST_ITEMS = 5000
 
 
 def read(path: Path, choose: Choose) -> Columns:
@@ -85,11 +83,11 @@ def _datasets(file) -> list:
         prefix, group, depth = waiting.pop()
         local = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink) and name != "#refs#"]
         for name, item in ((prefix + name, group[name]) for name in local):
-            if len(found) + len(waiting) > _MOST_ITEMS:
-                raise ValueError(f"more than {_MOST_ITEMS} variables")
+            if len(found) + len(waiting) > MOST_ARRAYS:
+                raise ValueError(f"more than {MOST_ARRAYS} variables")
             if isinstance(item, h5py.Dataset) and _is_plain(item):
                 found.append((name, item))
-            elif isinstance(item, h5py.Group) and depth < _MOST_DEPTH:
+            elif isinstance(item, h5py.Group) and depth < MOST_DEPTH:
                 waiting.append((f"{name}.", item, depth + 1))
     return found
 

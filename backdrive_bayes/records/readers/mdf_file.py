@@ -44,9 +44,7 @@ def _named(path: Path, file) -> dict[str, tuple[int, int]]:
         master = file.masters_db.get(number)
         found += [(number, i, c.name, c.unit) for i, c in enumerate(group.channels) if i != master]
     names = [name for _, _, name, _ in found]
-    return {
-        labelled(f"group {g}/{name}" if names.count(name) > 1 else name, unit): (g, i) for g, i, name, unit in found
-    }
+    return {labelled(f"group {g}/{name}" if names.count(name) > 1 else name, unit): (g, i) for g, i, name, unit in found}
 
 
 def _signal(path: Path, file, name: str, group: int, index: int) -> Signal:

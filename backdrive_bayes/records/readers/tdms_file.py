@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from backdrive_bayes.errors import BadInput, MissingExtra
-from backdrive_bayes.records.header_names import is_named
-from backdrive_bayes.records.quantities import UNITS, labelled, split_unit
+from backdrive_bayes.records.quantities import UNITS, is_named, labelled, split_unit
 from backdrive_bayes.records.readers.clocks import TIME_HEADER, Signal, on_one_clock
 from backdrive_bayes.records.readers.limits import Choose, Columns, check_rows, finite_columns, silence
 

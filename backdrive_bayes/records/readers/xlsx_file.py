@@ -45,7 +45,7 @@ def _refuse_bomb(path: Path) -> None:
     except (zipfile.BadZipFile, ValueError, NotImplementedError, EOFError) as error:
         raise BadInput(path, "an Excel workbook (.xlsx)", str(error)[:80] or type(error).__name__) from error
     bomb = size > limits.FREE_INFLATED_BYTES and size > limits.MAX_INFLATION * path.stat().st_size
-    if bomb or size > limits.MAX_INFLATED_BYTES:
+    if bomb or size > limits.MAX_BYTES:
         raise BadInput(path, "at most 2 GB once inflated, and no bomb", f"{size / 1e6:.0f} MB")
 
 
