@@ -73,7 +73,7 @@ def test_thresholds_grow_each_by_its_own_logarithm():
 def test_growth_has_its_own_derivatives(ends):
     """Against difference quotients thirty times as wide, at a growth that is not zero."""
     history, growth, step = ramp(0.0, 1.0, -1.0, 1.0), (0.1, -0.1), 0.03
-    weights = {p.name: np.ones((p.cells.count if p.mixing is None else p.mixing.shape[1])) for p in REDUCER.parts}
+    weights = {p.name: np.ones(p.cells.count if p.mixing is None else p.mixing.shape[1]) for p in REDUCER.parts}
 
     def angle(more):
         columns = (REDUCER.ends if ends else REDUCER.columns)(history, more)
