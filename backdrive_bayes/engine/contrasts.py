@@ -15,7 +15,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from backdrive_bayes.engine.design import Design, Group
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 
 WIDENED = 5.0
 SIZES = np.exp([-1.5, 0.0, 1.5])

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linearise import Linear, linearise
+from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.linearise import linearise
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts

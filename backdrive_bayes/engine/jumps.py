@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 
 STEEP = 6.0
 """Slopes beyond so many times the median are clearances being crossed: nothing is looked for there."""

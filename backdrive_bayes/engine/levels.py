@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.engine.design import class_priors
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.mechanics.registry import all_effects
 

@@ -1,5 +1,4 @@
-"""The mode of the few nonlinear parameters, with every listed effect present under a wide scale, and the linear
-model about it."""
+"""The modes of the few nonlinear parameters, effects present under a wide scale, and the linear models about them."""
 
 from __future__ import annotations
 
@@ -9,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backdrive_bayes.engine.design import (
-    Design,
     Group,
     class_groups,
     class_priors,
@@ -17,7 +15,8 @@ from backdrive_bayes.engine.design import (
     path_group,
     tangent_groups,
 )
-from backdrive_bayes.engine.marginal import Solution, Whitened, find_scales, whiten
+from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.periodic import PRICE, WAVE, clearest_wave, wave_group
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
@@ -60,48 +59,6 @@ JITTERS = tuple(Jitter(size, length) for size in (0.15, 0.5, 1.5, 5.0, 15.0, 45.
 """Sizes and lengths that are tried."""
 
 
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """The linear model of a unit about its mode.
-
-    ``design`` holds the class and every effect, ``angles`` what its weights explain (tangent effects counted from an undistorted
-    bench), ``covariances`` the noise; ``log_scale`` and ``solution`` are those of the joint model, ``predicted`` its
-    block means of the angle.
-    """
-
-    reduced: Reduced
-    reducer: ReducerClass
-    distortion: Distortion
-    design: Design
-    effects: tuple[Effect, ...]
-    angles: tuple[np.ndarray, ...]
-    covariances: tuple[np.ndarray, ...]
-    data: Whitened
-    log_scale: dict[str, float]
-    solution: Solution
-    jitter: Jitter
-    predicted: tuple[np.ndarray, ...]
-
-    @property
-    def log_marginal(self) -> float:
-        """Log marginal likelihood of the joint model, comparable between modes, jitters and designs of one unit."""
-        return self.solution.log_marginal + self.data.log_volume
-
-    @property
-    def weights(self) -> dict[str, np.ndarray]:
-        """Mean weights by group."""
-        return self.design.split(self.solution.mean)
-
-    def whitened(self, design: Design) -> Whitened:
-        """The columns of another design and the angles, whitened as the unit's own."""
-        return whiten(design.records(), self.angles, self.covariances, self.data.noise_dof, self.reduced.trust)
-
-    def residuals(self) -> list[np.ndarray]:
-        """Whitened residual of each record's blocks."""
-        white = self.data.y - self.data.x @ self.solution.mean
-        return np.split(white, np.cumsum([a.size for a in self.angles])[:-1])
-
-
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
     """The joint model's mode, where every effect may act, and modes where only some of those act that bend the prediction.
 
@@ -127,7 +84,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         for some in itertools.combinations(bent, count):
             search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
             found.append(search.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter))
-    return tuple(_without(linear, WAVE) for linear in found)
+    return tuple(linear.without(WAVE) for linear in found)
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
@@ -142,17 +99,6 @@ def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
 def _only(distortion: Distortion, some) -> Distortion:
     """A distortion by some effects alone."""
     return replace(distortion, **{p: 0.0 for n, places in BENDING.items() if n not in some for p in places})
-
-
-def _without(linear: Linear, name: str) -> Linear:
-    """The linear model less one group, its solution as it was beside that group."""
-    if name not in linear.design.names:
-        return linear
-    keep = linear.design.index != linear.design.names.index(name)
-    design = Design(tuple(g for g in linear.design.groups if g.name != name))
-    solution = replace(linear.solution, mean=linear.solution.mean[keep], root=linear.solution.root[keep])
-    scales = {n: v for n, v in linear.log_scale.items() if n != name}
-    return replace(linear, design=design, data=linear.whitened(design), log_scale=scales, solution=solution)
 
 
 def learn_jitter(linear: Linear) -> Jitter:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from backdrive_bayes.engine.design import Design, Group
-
-if TYPE_CHECKING:
-    from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 
 FREQUENCIES = np.arange(3.0, 50.0, 0.125)
 """Waves in one angle scale: fewer than six over the whole range cannot be told from smooth functions of the angle; the spacing
@@ -37,9 +34,7 @@ def wave_group(linear: Linear, frequency: float | np.ndarray) -> Group:
 
 def with_wave(linear: Linear, frequency: float) -> Linear:
     """The linear model with a wave of the angle's reading beside."""
-    design = linear.design.joined(replace(wave_group(linear, frequency), name=WAVE))
-    scales = linear.log_scale | {WAVE: float(np.log(AMPLITUDE))}
-    return replace(linear, design=design, data=linear.whitened(design), log_scale=scales)
+    return linear.beside(replace(wave_group(linear, frequency), name=WAVE), AMPLITUDE)
 
 
 def clearest_wave(linear: Linear) -> tuple[float, float]:

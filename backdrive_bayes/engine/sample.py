@@ -115,9 +115,7 @@ def _ensembles(target, move, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
     samplers = []
     for chain in range(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(
-            WALKERS, len(names), target, moves=[(move, 0.6), (DEMove(), 0.4)], vectorize=True
-        )
+        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=[(move, 0.6), (DEMove(), 0.4)], vectorize=True)
         random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
         sampler.random_state = random.get_state()
         sampler.run_mcmc(move.draw(random, WALKERS), 4, skip_initial_state_check=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.mechanics.effect import GrowthEffect
 
 HEIGHT = 0.3

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.engine.design import Group
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 
 NODES = np.linspace(-0.98, 0.98, 50)
 """Torques at which legs of the two directions may part."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.infer import infer, prepare
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.periodic import with_wave
 from backdrive_bayes.engine.posterior import Posterior
@@ -69,9 +69,7 @@ def with_columns(weighed: Weighed, effects: tuple[str, ...]) -> Linear:
     if ENCODER in effects:
         linear = with_wave(linear, weighed.frequency.get(weighed.nearest(effects), weighed.frequency[(ENCODER,)]))
     if UNEXPLAINED in effects or STICK_SLIP in effects:
-        design = linear.design.joined(path_group(linear.reduced, UNKNOWN))
-        scales = linear.log_scale | {UNKNOWN.name: float(np.log(UNKNOWN.present(linear.reduced.context)))}
-        linear = replace(linear, design=design, data=linear.whitened(design), log_scale=scales)
+        linear = linear.beside(path_group(linear.reduced, UNKNOWN), UNKNOWN.present(linear.reduced.context))
     return linear
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import expit
 
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior

@@ -13,7 +13,7 @@ from backdrive_bayes.engine.contrasts import SIZE_WEIGHTS, SIZES, averaged, make
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import AMPLITUDE, FREQUENCIES, wave_group, with_wave
 from backdrive_bayes.engine.traces import trace_of

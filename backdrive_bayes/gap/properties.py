@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import expit, log_ndtr
 
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed

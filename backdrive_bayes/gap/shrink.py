@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from backdrive_bayes.engine.design import Design
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import Scales, find_scales
 
 RESAMPLED = 400

@@ -9,7 +9,7 @@ import numpy as np
 
 from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.shrink import (

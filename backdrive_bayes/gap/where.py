@@ -8,7 +8,7 @@ import numpy as np
 
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.mechanics.registry import UNKNOWN
 from backdrive_bayes.records.branches import cycle_numbers, find_segments
