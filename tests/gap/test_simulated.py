@@ -97,15 +97,16 @@ def reduced():
 
 
 def test_noise_free_records_are_read_with_the_bench_s_noise(reduced):
-    given = simulated(hertz=60.0)
-    read, added = through_bench(given, reduce_unit(given), reduced, np.random.default_rng(0))
-    channels = [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, find_segments(r.time_s, r.torque_nm)) for r in read.records]
-    noise, bench = estimate_common_noise(channels)[0], reduced.noise[0]
-    assert noise.correlated_rad == pytest.approx(bench.correlated_rad, rel=0.2)
-    assert noise.torque_nm == pytest.approx(bench.torque_nm, rel=0.2)
+    given, bench, found = simulated(hertz=60.0), reduced.noise[0], []
+    for seed in range(6):
+        read, added = through_bench(given, reduce_unit(given), reduced, np.random.default_rng(seed))
+        channels = [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, find_segments(r.time_s, r.torque_nm)) for r in read.records]
+        found.append(estimate_common_noise(channels)[0])
+    assert np.mean([n.correlated_rad for n in found]) == pytest.approx(bench.correlated_rad, rel=0.25)
+    assert np.mean([n.torque_nm for n in found]) == pytest.approx(bench.torque_nm, rel=0.2)
     assert added.white_rad <= bench.white_rad and np.isfinite([*vars(added).values()]).all()
     noisy = replace(given, records=tuple(replace(r, angle_rad=r.angle_rad + _noise(r, 1e-3)) for r in given.records))
-    assert through_bench(noisy, reduce_unit(noisy), reduced, np.random.default_rng(0))[1].white_rad == 0.0
+    assert through_bench(noisy, reduce_unit(noisy), reduced, np.random.default_rng(0))[1].correlated_rad == 0.0
 
 
 def _noise(record, sd):

@@ -65,7 +65,7 @@ UNITS = {
     # A wave that is even in the angle: an odd one is part of an odd loop.
     "encoder_error": lambda: changed(_smooth(), lambda r, i: 4e-4 * np.cos(2 * np.pi * r.angle_rad / PERIOD_RAD)),
     "thermal_drift": lambda: changed(_smooth(loops=MORE), lambda r, i: 1.5e-3 * (r.time_s / 20) ** 0.7),
-    "asymmetric_stiffness": lambda: changed(_smooth(), lambda r, i: 0.02 * np.abs(r.torque_nm)),
+    "asymmetric_stiffness": lambda: changed(_smooth(), lambda r, i: 0.035 * np.abs(r.torque_nm)),
     # A step of the reading halfway through the first record.
     "unknown": lambda: changed(_smooth(), lambda r, i: 1.5e-3 * (r.time_s > 0.55 * r.time_s[-1]) * (i == 0)),
     "second_backlash": lambda: _smooth((0.15, 0.25, 0.35)),
