@@ -60,10 +60,11 @@ JITTERS = tuple(Jitter(size, length) for size in (0.15, 0.5, 1.5, 5.0, 15.0, 45.
 
 
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
-    """The joint model's mode, where every effect may act, and modes where only some of those act that bend the prediction.
+    """The joint model's mode, where every effect may act, and modes of what bends the prediction.
 
     Whatever cannot be followed by a straight line from the joint mode (an offset, a lag, a law of the rate, a wave) has modes
-    of its own: without any of them, with each, and with pairs. A hypothesis is weighed about the mode where it is likeliest.
+    of its own: one where none of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode
+    where it is likeliest.
     """
     fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))
     starts = _apart([*possible_starts(reduced), Distortion()], reduced.context)
@@ -137,7 +138,7 @@ class _Search:
     effects: tuple[Effect, ...]
     modules: tuple[str, ...]
     fixed: tuple[Group, ...]
-    bending: tuple[str, ...] = tuple(BENDING)
+    only: tuple[str, ...] | None = None
 
     def run(self, distortion: Distortion, steps: int, refine: bool = False, jitter: Jitter | None = None) -> Linear:
         reduced, context = self.reduced, self.reduced.context
@@ -197,7 +198,7 @@ class _Search:
     def _solve(self, reducer, design, angles, covariances, start):
         priors = class_priors(reducer)
         for effect in self.effects:
-            free = effect is not BENCH_HYSTERESIS and effect.name not in self._held
+            free = self._acts(effect)
             level = effect.present(self.reduced.context) if free else effect.trace(self.reduced.context)
             priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
@@ -215,10 +216,12 @@ class _Search:
             found.append((solution.log_marginal + scales.log_prior(log_scale), log_scale, solution))
         return data, *max(found, key=lambda f: f[0])[1:]
 
-    @property
-    def _held(self) -> set[str]:
-        """Terms of the bending effects that may not act, and stay at trace level."""
-        return {t.name for n in BENDING if n not in self.bending for t in all_effects()[n]}
+    def _acts(self, effect) -> bool:
+        """Whether an effect may be more than a trace: all at the joint mode, none that bends where ``only`` is empty."""
+        if effect is BENCH_HYSTERESIS or self.only is None:
+            return self.only is None and effect is not BENCH_HYSTERESIS
+        names = self.only or [n for n in all_effects() if n not in BENDING]
+        return effect.name in {t.name for n in names for t in all_effects().get(n, ())}
 
     def _moved(self, linear):
         weights = linear.weights

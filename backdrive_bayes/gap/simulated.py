@@ -13,7 +13,7 @@ from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities, where
 from backdrive_bayes.gap.diagnose import LEVEL, SHOWN, Diagnosis, diagnose
 from backdrive_bayes.gap.parameters import interval
-from backdrive_bayes.gap.simulator import Simulator, effects_of, read_simulator
+from backdrive_bayes.gap.simulator import Simulator, effects_of, read_simulator, require_reach
 from backdrive_bayes.gap.split import PARTS, STAGES, Split
 from backdrive_bayes.indicators.draws import IndicatorDraws
 from backdrive_bayes.records.record import Unit
@@ -39,6 +39,7 @@ def diagnose_simulated(
     ``simulated`` holds what the simulator answered to the unit's or other torque paths. BadInput as of ``diagnose``, and where
     the unit's torques go beyond the simulated ones.
     """
+    require_reach(simulated, unit)
     with threadpool_limits(1, user_api="blas"):
         found = diagnose(unit, seed=seed, allowed=allowed, k=k, progress=progress)
         simulator = read_simulator(simulated, found.weighed.linear.reduced, seed, progress)

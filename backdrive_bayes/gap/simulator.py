@@ -75,14 +75,8 @@ def effects_of(answer: str) -> tuple[str, ...]:
 
 
 def read_simulator(simulated: Unit, measured: Reduced, seed: int, note: Callable[[str], None] = lambda text: None) -> Simulator:
-    """Fit the class to a simulator's records as ``measured``'s bench would have read them, and weigh effects in them.
-
-    BadInput where the measured torques go beyond those that the simulator was asked.
-    """
+    """Fit the class to a simulator's records as ``measured``'s bench would have read them, and weigh effects in them."""
     reduced, rng = reduce_unit(simulated, FINE), np.random.default_rng([seed, 9])
-    if measured.torque_scale_nm > (1.0 + SLACK) * reduced.torque_scale_nm:
-        reach = f"torques up to {measured.torque_scale_nm:.4g} N·m, the unit's largest"
-        raise BadInput(f"simulated records of {simulated.name}", reach, f"{reduced.torque_scale_nm:.4g} N·m")
     unit, added = through_bench(simulated, reduced, measured, rng)
     weighed = weigh(prepare(unit, note=lambda text: note(f"simulator: {text}")))
     properties = {p.name: p.probability for p in find_properties(weighed, rng)}
@@ -92,15 +86,27 @@ def read_simulator(simulated: Unit, measured: Reduced, seed: int, note: Callable
     return Simulator(simulated, reduced, posterior, answers, added)
 
 
+def require_reach(simulated: Unit, unit: Unit) -> None:
+    """BadInput where the unit's torques go beyond those that the simulator was asked."""
+    asked, measured = (max(float(np.abs(r.torque_nm).max()) for r in u.records) for u in (simulated, unit))
+    if measured > (1.0 + SLACK) * asked:
+        reach = f"torques up to {measured:.4g} N·m, the largest of {unit.name}"
+        raise BadInput(f"simulated records of {simulated.name}", reach, f"{asked:.4g} N·m")
+
+
 def through_bench(simulated: Unit, reduced: Reduced, measured: Reduced, rng) -> tuple[Unit, BenchNoise]:
-    """The simulated records with as many samples a torque travelled and as much noise as the measured ones, and what was added.
+    """The simulated records with as many samples a torque travelled as the measured one nearest in rate and as much noise, and
+    what was added.
 
     What can be told of the simulator is then what can be told of the unit. Records noisier than the bench stay as they are.
     """
     real = measured.unit.records
-    density = np.median([r.time_s.size / _travel(b) for r, b in zip(real, measured.blocks, strict=True)])
+    density = np.array([r.time_s.size / _travel(b) for r, b in zip(real, measured.blocks, strict=True)])
+    rates = [np.log(r.context.rate * r.torque_scale_nm) for r in (reduced, measured)]
+    nearest = density[np.abs(rates[0][:, None] - rates[1]).argmin(axis=1)]
     step = float(np.median([np.median(np.diff(r.time_s)) for r in real]))
-    records = [_sampled(r, density * _travel(b)) for r, b in zip(simulated.records, reduced.blocks, strict=True)]
+    own_records = zip(simulated.records, reduced.blocks, nearest, strict=True)
+    records = [_sampled(r, each * _travel(b)) for r, b, each in own_records]
     own, bench = _noise(records), measured.noise[0]
     added = BenchNoise(
         _missing(bench.white_rad, own.white_rad),

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from support.made_up_diagnosis import diagnosis, interval, write_diagnosis
+from support.made_up_diagnosis import diagnosis, interval, simulator, write_diagnosis
 from support.told import told
 
 from backdrive_bayes.errors import BadInput
@@ -211,3 +211,20 @@ def test_numbers_in_words():
     assert share_text(interval(-0.2, 0.1)) == "−20 % [−30, −10]"
     assert share_text({"median": -1.0, "lo": -1.0, "hi": 0.1}) == "≤ −100 % [≤ −100, 10]"
     assert share_text(interval(0.11, 0.0)) == "11 %" and share_text(None) == "not defined"
+
+
+@pytest.mark.parametrize(("count", "rows"), [(1, 1), (3, 4)])
+def test_the_gap_to_a_simulator_is_drawn_by_its_shares_and_stages(count, rows):
+    figure = figures_of(saved(count, **simulator(count)))["simulator"]
+    bars = next(axes for axes in figure.axes if axes.patches)
+    assert len(bars.get_yticks()) == rows and "62 / 30 / 8 %" in {t.get_text() for t in bars.texts}
+    assert sum(p.get_width() for p in bars.patches[:3]) == pytest.approx(100.0)
+    names = [axes.get_ylabel() for axes in figure.axes if "[arcmin]" in axes.get_ylabel()]
+    assert len(names) == 3 and names[1].startswith("re-tuned")
+    texts = boxes(figure)
+    assert not [(a.get_text(), b.get_text()) for (a, x), (b, y) in combinations(texts, 2) if x.overlaps(y)]
+
+
+def test_nothing_is_drawn_of_a_simulator_that_agrees():
+    assert "simulator" not in figures_of(saved(1, **simulator(1, told=False)))
+    assert "simulator" not in figures_of(saved())

@@ -10,7 +10,7 @@ from backdrive_bayes.bench.known_truth import ramp
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.gap.diagnose import diagnose
-from backdrive_bayes.gap.simulated import compared, lacking, summary
+from backdrive_bayes.gap.simulated import compared, diagnose_simulated, lacking, summary
 from backdrive_bayes.gap.simulator import read_simulator, through_bench
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise
@@ -105,6 +105,7 @@ def test_noise_free_records_are_read_with_the_bench_s_noise(reduced):
     assert np.mean([n.correlated_rad for n in found]) == pytest.approx(bench.correlated_rad, rel=0.25)
     assert np.mean([n.torque_nm for n in found]) == pytest.approx(bench.torque_nm, rel=0.2)
     assert added.white_rad <= bench.white_rad and np.isfinite([*vars(added).values()]).all()
+    given = simulated()
     noisy = replace(given, records=tuple(replace(r, angle_rad=r.angle_rad + _noise(r, 1e-3)) for r in given.records))
     assert through_bench(noisy, reduce_unit(noisy), reduced, np.random.default_rng(0))[1].correlated_rad == 0.0
 
@@ -114,8 +115,8 @@ def _noise(record, sd):
 
 
 def test_torques_beyond_the_simulated_ones_are_refused(reduced):
-    with pytest.raises(BadInput, match="torques up to 0.1"):
-        read_simulator(simulated(loops=((0.08, 0.05),)), reduced, 0)
+    with pytest.raises(BadInput, match="torques up to 0.1.*found 0.08"):
+        diagnose_simulated(reduced.unit, simulated(loops=((0.08, 0.05),)))
 
 
 def test_lacking_is_what_the_unit_alone_has():

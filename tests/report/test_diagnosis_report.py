@@ -5,7 +5,7 @@ import json
 
 import pypdf
 import pytest
-from support.made_up_diagnosis import write_diagnosis
+from support.made_up_diagnosis import simulator, write_diagnosis
 from support_results import write_result
 
 from backdrive_bayes.errors import BadInput
@@ -190,3 +190,29 @@ def test_a_broken_result_is_one_clear_line(tmp_path):
     (tmp_path / "diagnosis.json").write_text(json.dumps(result))
     with pytest.raises(BadInput, match="diagnosis.json, where.map 1, key branch: expected one of"):
         report.report_bytes([tmp_path])
+
+
+def test_a_simulator_has_a_page_of_its_own(tmp_path):
+    write_diagnosis(tmp_path, 3, **simulator(3))
+    pages, _ = pages_of(tmp_path)
+    assert "GAP TO THE SIMULATOR, CAUSES STILL CONFUSABLE" in pages[0] and "Missing in the simulator: interface slip" in pages[0]
+    for needed in (
+        "The simulator joint.xml",
+        "Re-tuning closes 62 % of the gap, interface slip a further 30 %",
+        "The simulator itself shows sensor lag",
+        "asked 2 of 3 of the unit's torque paths",
+        "closed by re-tuning 62 % [57, 67]",
+        "closed by what is missing 30 % [24, 36]",
+        f"as it is {significant(9e-4, 3, ARCMIN)}; re-tuned {significant(3.6e-4, 3, ARCMIN)}",
+        "clearance arcmin 5.16 7.05 [6.91, 7.18] changed",
+    ):
+        assert needed in pages[1], needed
+    assert "friction torque N·m 0.110 0.109 [0.104, 0.114]" in pages[1]
+
+
+@pytest.mark.parametrize(("told", "title"), [(True, "CLOSED BY RE-TUNING"), (False, "NO GAP TO THE SIMULATOR")])
+def test_a_simulator_that_lacks_nothing(tmp_path, told, title):
+    answer = {"effects": [], "credible_set_90": ["none"]}
+    write_diagnosis(tmp_path, 1, **simulator(1, told=told), answer=answer)
+    pages, _ = pages_of(tmp_path)
+    assert title in pages[0] and ("closed by re-tuning" in pages[1]) == told

@@ -134,6 +134,36 @@ def _shrink(files):
     }
 
 
+def simulator(count=3, **changes):
+    """What a simulator of the same clamp lacks, to be merged into :func:`diagnosis`, its residuals included."""
+    made = diagnosis(count)
+    files = [row["file"] for row in made["records"]]
+    shares = {"retuning": interval(0.62, 0.05), "effect": interval(0.3, 0.06), "left": interval(0.08, 0.03)}
+    found = {
+        "unit": "joint.xml",
+        "told": True,
+        "summary": "Re-tuning closes 62% of the gap, interface slip a further 30%; 8% is left.",
+        "closed_by_retuning": shares["retuning"],
+        "closed_by_effect": shares["effect"],
+        "left": shares["left"],
+        "closed_by_both": interval(0.92, 0.03),
+        "effects": ["sensor_lag"],
+        "shared_effects": [],
+        "same_path": [True] * (count - 1) + [False],
+        "rms_rad": {"simulated": 9e-4, "retuned": 3.6e-4, "explained": 5.2e-5, "noise_floor": NOISE},
+        "parts": [{"part": part, **made["where"]} for part in shares],
+        "records": [{"record": f, **shares} for f in files],
+        "parameters": [
+            {"name": "clearance_rad", "unit": "rad", "simulated": 1.5e-3, "simulated_interval": interval(1.5e-3, 4e-5),
+             "measured": interval(2.05e-3, 4e-5), "change": interval(5.5e-4, 6e-5), "credible": True},
+            {"name": "friction_torque_Nm", "unit": "N·m", "simulated": 0.11, "simulated_interval": interval(0.11, 0.005),
+             "measured": interval(0.109, 0.005), "change": interval(-0.001, 0.007), "credible": False},
+        ],
+    }  # fmt: skip
+    residual = [row | {"retuned_rad": [0.4 * v for v in row["before_rad"]]} for row in made["residual"]]
+    return {"simulator": found | changes, "residual": residual}
+
+
 def _shifts():
     rows = (
         ("clearance", "rad", 2.1e-3, 2.05e-3, 6e-5, 4e-5, -1.4),
