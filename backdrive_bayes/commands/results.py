@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import platform
@@ -176,6 +177,8 @@ def retire(out: Path, result: dict) -> None:
     for figure in (out / "figures").glob("*.*g"):
         if not (kept[0] and figure.name.startswith(DIAGNOSIS_FIGURES)) and figure.suffix in (".svg", ".png"):
             figure.unlink()
+    with contextlib.suppress(OSError):  # it is not there, or holds what stays
+        (out / "figures").rmdir()
 
 
 def _keep_own(path: Path, schema: str, about: dict) -> bool:

@@ -42,7 +42,7 @@ def draw(saved: Diagnosed):
     with styled():
         figure = new_figure(sum(heights))
         shown = [(h, part) for h, part in zip(heights, (_bars, _curves), strict=True) if h]
-        parts = np.atleast_1d(figure.subfigures(len(shown), 1, height_ratios=[h for h, _ in shown]))
+        parts = figure.subfigures(len(shown), 1, squeeze=False, height_ratios=[h for h, _ in shown])[:, 0]
         for part, (_, draw_part) in zip(parts, shown, strict=True):
             draw_part(part, saved, bars if draw_part is _bars else (records, entries, stages))
     return figure

@@ -54,8 +54,8 @@ def make_chain(reducer: OdeReducer) -> Chain:
     constant, ratio = reducer.levels()
     bend = reducer.presliding * np.array([1.0, reducer.bristle_ratio])
     share = np.array([1.0 - reducer.bristle_share, reducer.bristle_share])
-    tiled = (np.tile(row, (constant.size, 1)) for row in (bend, share))
-    return Chain(torque, travel, np.zeros_like(torque), constant, ratio, *tiled, reducer.bristle_power)
+    bends, shares = np.tile(bend, (constant.size, 1)), np.tile(share, (constant.size, 1))
+    return Chain(torque, travel, np.zeros_like(torque), constant, ratio, bends, shares, reducer.bristle_power)
 
 
 def coupling(torque, travel, friction: float, bend: float) -> Chain:
