@@ -25,7 +25,7 @@ from backdrive_bayes.engine import sample as engine
 from backdrive_bayes.engine.diagnostics import diagnose_draws
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.linearise import Linear
 from backdrive_bayes.engine.marginal import Scales, find_scales
 
 LOOPS = ((0.1, 0.01), (0.1, 0.05), (0.1, 0.1))
@@ -68,7 +68,7 @@ class Problem:
 
 def make_problem() -> Problem:
     known = physical_reducer(np.random.default_rng(0))
-    linear = prepare(simulate_unit(known, LOOPS, BenchNoise(), np.random.default_rng(1)))[0]
+    linear = prepare(simulate_unit(known, LOOPS, BenchNoise(), np.random.default_rng(1)))
     scales = linear.design.scales(levels(linear, ()))
     mode, _ = find_scales(linear.data, scales)
     return Problem(linear, scales, mode)
