@@ -40,34 +40,28 @@ SHARES = (("S_g_over_S", "geometric error", BLUE, ""), ("S_f_over_S", "friction"
 
 def draw_loops(comparison: dict, conditions: list[int]):
     """Overlaid loops at the given overlays (at most three), angle [arcmin] over torque [N·m]."""
-    with styled():
-        figure, axes = _overlaid(comparison, conditions, 2.3, _one_loop)
-        for panel in axes:
-            panel.set_xlabel("torque [N·m]")
-        axes[0].set_ylabel("angle [arcmin]")
-        legend_below(figure, axes[0], columns=4)
-    return figure
+    return _overlaid(comparison, conditions, 2.3, _one_loop, "angle [arcmin]", xlabel="torque [N·m]")
 
 
 def draw_energy(comparison: dict, conditions: list[int]):
     """Overlaid torque–energy curves at the given overlays (at most three), mJ per N·m over |torque| [N·m]."""
+    looks = {"xlabel": "|torque| [N·m]", "xlim": (0, None), "ylim": (0, None)}
+    return _overlaid(comparison, conditions, 2.9, _one_energy, "energy per torque\n[mJ/(N·m)]", **looks)
+
+
+def _overlaid(comparison, conditions, height, draw, ylabel, **looks):
+    """A figure of that height [inch] with one panel a condition, ``draw`` called for every unit."""
     with styled():
-        figure, axes = _overlaid(comparison, conditions, 2.9, _one_energy)
-        for panel in axes:
-            panel.set(xlabel="|torque| [N·m]", xlim=(0, None), ylim=(0, None))
-        axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
+        figure = new_figure(height)
+        axes = _panels(figure, comparison, conditions)
+        for panel, condition in zip(axes, conditions, strict=True):
+            for record, look, name in _members(comparison, condition):
+                draw(panel, record, look, name)
+        for panel in axes:  # only now: limits of a shared axis would hold for panels still to be drawn
+            panel.set(**looks)
+        axes[0].set_ylabel(ylabel)
         legend_below(figure, axes[0], columns=4)
     return figure
-
-
-def _overlaid(comparison, conditions, height, draw):
-    """A figure of that height [inch] with one panel a condition, ``draw`` called for every unit; and its panels."""
-    figure = new_figure(height)
-    axes = _panels(figure, comparison, conditions)
-    for panel, condition in zip(axes, conditions, strict=True):
-        for record, look, name in _members(comparison, condition):
-            draw(panel, record, look, name)
-    return figure, axes
 
 
 def with_ratios(comparison: dict) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 
 import numpy as np
@@ -28,14 +29,13 @@ CAPTION = (
 )
 MOST = 16
 """Parameters in one figure; more are spread evenly over several."""
-LEVELS = (0.393, 0.865)
+LEVELS = tuple(1 - math.exp(-0.5 * deviations**2) for deviations in (1, 2))
+"""What contours at one and two standard deviations of a normal in two dimensions hold."""
 HEIGHT_IN = (0.95, 0.33, 6.9)
 """Height of what stands around the panels, of a panel, and of the whole figure at most [inch]."""
 PAD_IN = 0.06
 TICK_LINE_IN = 0.14
 """Height of a line of tick labels with the air that it needs."""
-
-
 NAME_IN = 0.42
 """Height of a name above its panel."""
 

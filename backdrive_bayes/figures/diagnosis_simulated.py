@@ -14,7 +14,9 @@ from backdrive_bayes.figures.style import (
     ORANGE,
     PER_FIGURE,
     RISING,
+    TORQUE_TICKS,
     few_ticks,
+    legend_below,
     new_figure,
     styled,
 )
@@ -30,7 +32,6 @@ PARTS = (
     ("left", "left", "#DCDCDC", "...."),
 )
 STAGES = (("before_rad", "as it is"), ("retuned_rad", "re-tuned"), ("after_rad", "with what\nit lacks"))
-_STEPS = {1: 10, 2: 6, 3: 5}
 
 
 def draw(saved: Diagnosed):
@@ -76,7 +77,7 @@ def _bars(part, saved, shown):
     axes.tick_params(axis="y", length=0)
     axes.axvline(0, color="black", linewidth=0.6)
     axes.axvline(100, color="black", linewidth=0.7, linestyle=(0, (4, 2)))
-    few_ticks(axes, 10, 100)
+    few_ticks(axes, 10, None)
     axes.set_xlabel("share of the gap [%]; dashed: down to the noise")
     axes.set_title("What closes the gap?", loc="left", fontweight="bold")
     part.legend(loc="outside upper right", ncols=3, handletextpad=0.4, columnspacing=1.2)
@@ -93,10 +94,9 @@ def _curves(part, saved, given):
     for axes, (_, name) in zip(panels[:, 0], stages, strict=True):
         axes.set_ylabel(f"{name}\n[arcmin]")
     for axes in panels.ravel():
-        few_ticks(axes, _STEPS[len(records)], 4)
+        few_ticks(axes, TORQUE_TICKS[len(records)], 4)
     part.align_ylabels(panels[:, 0])
-    handles, names = panels[0, 0].get_legend_handles_labels()
-    part.legend(handles, names, loc="outside lower center", ncols=3)
+    legend_below(part, panels[0, 0], columns=3)
 
 
 def _curve(axes, entry, key):

@@ -97,8 +97,8 @@ def few_ticks(axes, x: int = 4, y: int | None = 5) -> None:
             axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
 
 
-def legend_below(figure: Figure, *axes, columns: int, **look) -> None:
-    """One legend beneath the figure for everything that has a name in some axes, each name once."""
+def legend_below(figure, *axes, columns: int, **look) -> None:
+    """One legend beneath a figure, or a part of one, for everything that has a name in some axes, each name once."""
     named: dict = {}
     for panel in axes:
         for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
