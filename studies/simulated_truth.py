@@ -131,8 +131,8 @@ def _of_class(rng, truth: Known, variant, clean):
 
 
 def _of_bench(rng, reality, variant, clean):
-    mechanics, truth = find_bench(reality.bench), reality.truth
-    reducer = truth.reducer if variant == 2 and clean else _moved(rng, mechanics, truth.reducer)
+    truth = reality.truth
+    reducer = truth.reducer if variant == 2 and clean else _moved(rng, truth.reducer)
     has = variant == 2 and not clean
     effects = tuple(p.effect for p in truth.planted) if has else ()
     unit = _simulated(rng, reality.bench, reducer, effects, PLAN, truth.noise if has else None)
@@ -152,9 +152,9 @@ def _other_mechanics(rng, reality, number):
     return Shifted(unit, (), _bench_truth(bench, reducer, ()), gap, rest)
 
 
-def _moved(rng, mechanics, reducer) -> Any:
+def _moved(rng, reducer) -> Any:
     """The reducer with some of its parameters shifted."""
-    turned = [t for t in mechanics.turned(reducer) if len(_changed(reducer, t)) == 1]
+    turned = [t for t in reducer.turned() if len(_changed(reducer, t)) == 1]
     values = {"angle_rad": reducer.angle_rad * float(np.exp(rng.uniform(-SCALE, SCALE)))}
     for other in rng.choice(np.array(turned, object), SHIFTS, replace=False):
         (name,) = _changed(reducer, other)
@@ -204,12 +204,12 @@ def _rms(pieces) -> float:
 
 
 def _bench_truth(bench, reducer, effects) -> dict[str, float]:
-    """Compliance near T_r and the indicators of the settled loop at the first rate."""
+    """Compliance of the clean reducer near T_r, and the indicators of the settled loop at the first rate."""
     mechanics, where = find_bench(bench), _where(PLAN, reducer)[0]
     own = tuple(e for e in effects if e.of_reducer)
     found = own_loop(mechanics, reducer, own, where, reducer.rated_torque_nm)
     path = where.path
     rise = path.end_s - np.array([0.15, 0.0]) * reducer.rated_torque_nm / path.rate_nm_per_s
-    low, high = mechanics.angle(reducer, own, where, rise)
+    low, high = mechanics.angle(reducer, (), where, rise)
     kept = {name: found[name] for name in ("lost_motion_rad", "loop_area_J", "dissipation_ratio")}
     return kept | {"compliance_rated_rad_per_Nm": float((high - low) / (0.15 * reducer.rated_torque_nm))}
