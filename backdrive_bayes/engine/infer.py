@@ -14,6 +14,7 @@ from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.engine.reduced import Reduced, reduce_unit
 from backdrive_bayes.engine.sample import sample
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.mechanics.registry import BENCH, all_effects
 from backdrive_bayes.records.faults import without_wild
@@ -34,11 +35,14 @@ def library_terms():
 
 @one_thread()
 def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda text: None) -> tuple[Linear, ...]:
-    """The linear models of a unit about its modes, the joint one first."""
+    """The linear models of a unit about its modes, the joint one first; BadInput where its records leave nothing to infer from."""
     note("reducing the records")
     reduced = reduce_unit(without_wild(unit))
     note("finding the modes")
-    return linearise(reduced, library_terms(), modules)
+    try:
+        return linearise(reduced, library_terms(), modules)
+    except np.linalg.LinAlgError:
+        raise BadInput(unit.name, "records with noise and with an angle that moves", "equations without a solution") from None
 
 
 @one_thread()

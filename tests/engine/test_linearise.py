@@ -8,12 +8,13 @@ from support.planted import MORE, SCALE, UNITS, planted
 
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.design import class_groups, class_priors
-from backdrive_bayes.engine.infer import library_terms
+from backdrive_bayes.engine.infer import library_terms, prepare
 from backdrive_bayes.engine.linearise import learn_jitter, linearise
 from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.reduced import Jitter, reduce_unit
 from backdrive_bayes.engine.sample import ABOVE, compress
 from backdrive_bayes.engine.start import possible_starts
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import HALVINGS, ReducerClass
 from backdrive_bayes.mechanics.registry import LIBRARY
@@ -177,3 +178,10 @@ def test_a_wave_has_modes_with_and_without_it():
     waved = linearise(reduce_unit(UNITS["encoder_error"]()), library_terms())
     assert len(waved) == 3 and all("wave" not in m.design.names for m in waved)
     assert all(abs(m.distortion.offset) < 2e-3 for m in waved)
+
+
+def test_an_angle_that_stands_still_is_one_clear_line():
+    unit = planted()
+    frozen = replace(unit, records=tuple(replace(r, angle_rad=np.zeros(r.angle_rad.size)) for r in unit.records))
+    with pytest.raises(BadInput, match="an angle that moves"):
+        prepare(frozen)
