@@ -4,18 +4,21 @@
 
 One unit of known truth. Dense: the multivariate t of all block means, offsets taken out by an orthonormal basis, at draws of the
 scales. Sampler: its draws (independence proposals from an adapted Laplace approximation, differential evolution beside them)
-against emcee's stretch move alone, on the same marginal density, in the same run.
+against emcee's stretch move alone, on the same marginal density, in the same run; and, where numpyro and dynesty are installed,
+against NUTS, and a reduced case's evidence against nested sampling.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import emcee
 import numpy as np
+from exactness_samplers import DIRECTIONS, evidence, marginal_in_jax, nuts
 from scipy.linalg import block_diag, null_space
 from scipy.stats import multivariate_t
 from threadpoolctl import threadpool_limits
@@ -25,7 +28,7 @@ from backdrive_bayes.engine import sample as engine
 from backdrive_bayes.engine.diagnostics import diagnose_draws
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.engine.linearise import Linear
+from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import Scales, find_scales
 
 LOOPS = ((0.1, 0.01), (0.1, 0.05), (0.1, 0.1))
@@ -68,7 +71,7 @@ class Problem:
 
 def make_problem() -> Problem:
     known = physical_reducer(np.random.default_rng(0))
-    linear = prepare(simulate_unit(known, LOOPS, BenchNoise(), np.random.default_rng(1)))
+    linear = prepare(simulate_unit(known, LOOPS, BenchNoise(), np.random.default_rng(1)))[0]
     scales = linear.design.scales(levels(linear, ()))
     mode, _ = find_scales(linear.data, scales)
     return Problem(linear, scales, mode)
@@ -123,8 +126,16 @@ def stretch_move(problem: Problem, steps: int) -> Run:
     return Run(draws, np.minimum(told.bulk_ess, told.tail_ess), float(told.rhat.max()), target.evaluations, seconds)
 
 
-def table(problem: Problem, ours: Run, plain: Run) -> list[str]:
-    head = "| log scale | mean, package | mean, stretch | apart, standard errors | sd, package | sd, stretch |"
+def nuts_run(problem: Problem) -> Run:
+    """NUTS on the same compressed data, compilation included."""
+    data, basis = engine.compress(problem.linear.data, problem.scales, problem.mode)
+    free = np.flatnonzero(problem.scales.free)
+    density = marginal_in_jax(data, basis.group, problem.scales, problem.mode, free)
+    return Run(*nuts(density, problem.mode[free], problem.names))
+
+
+def table(problem: Problem, ours: Run, plain: Run, other: str) -> list[str]:
+    head = f"| log scale | mean, package | mean, {other} | apart, standard errors | sd, package | sd, {other} |"
     lines = [head, "|" + "---|" * 6]
     error = np.hypot(ours.sd / np.sqrt(ours.ess), plain.sd / np.sqrt(plain.ess))
     for k, name in enumerate(problem.names):
@@ -143,6 +154,32 @@ def cost(name, run: Run) -> str:
     )
 
 
+def others(problem: Problem, ours: Run) -> list[str]:
+    """Sections on NUTS and on nested sampling, or which of them is not installed."""
+    lines = []
+    if importlib.util.find_spec("numpyro"):
+        run = nuts_run(problem)
+        times = ours.ess.min() / ours.seconds / (run.ess.min() / run.seconds)
+        lines += ["## The package's sampler against NUTS", ""]
+        lines += ["Gradients stand under evaluations, seconds hold the compilation.", ""]
+        lines += [*table(problem, ours, run, "NUTS"), "", HEAD, "|" + "---|" * 7, cost("package", ours), cost("NUTS", run), ""]
+        lines += [f"Least effective sample size for a second: {times:.1f} times that of NUTS.", ""]
+    if importlib.util.find_spec("dynesty"):
+        found = evidence(problem.linear)
+        lines += [
+            "## A reduced case against nested sampling", "",
+            f"{DIRECTIONS} elastic weights, their scale and the noise scale, data drawn from them: log evidence "
+            f"{found.engine:.2f} by the engine's algebra and one integral, {found.nested:.2f} ± {found.error:.2f} by nested "
+            f"sampling ({found.evaluations} evaluations); {found.without_volume:.2f} with the determinant forgotten "
+            "(planted fault).", "",
+        ]  # fmt: skip
+    missing = [name for name in ("numpyro", "dynesty") if not importlib.util.find_spec(name)]
+    return lines + ([f"Not installed, hence not compared with: {', '.join(missing)}.", ""] if missing else [])
+
+
+HEAD = "| sampler | evaluations | seconds | R-hat | least ESS | ESS a thousand evaluations | ESS a second |"
+
+
 def report(problem: Problem, dense, ours: Run, plain: Run) -> str:
     whole, small = np.abs(dense).max(axis=0)
     per_evaluation = ours.ess.min() / ours.evaluations / (plain.ess.min() / plain.evaluations)
@@ -155,8 +192,8 @@ def report(problem: Problem, dense, ours: Run, plain: Run) -> str:
         "", "## Log marginal likelihood against dense algebra", "",
         f"At {len(dense)} draws of the scales, largest difference from the multivariate t of all block means, constants aside:",
         f"{whole:.1e} with all columns, {small:.1e} with the compressed ones that are sampled.", "",
-        "## The package's sampler against emcee's stretch move", "", *table(problem, ours, plain), "",
-        "| sampler | evaluations | seconds | R-hat | least ESS | ESS a thousand evaluations | ESS a second |", "|" + "---|" * 7,
+        "## The package's sampler against emcee's stretch move", "", *table(problem, ours, plain, "stretch"), "",
+        HEAD, "|" + "---|" * 7,
         cost("package", ours), cost("stretch move", plain), "",
         f"Least effective sample size: {per_evaluation:.1f} times the stretch move's for an evaluation, "
         f"{per_second:.1f} times for a second (weights drawn, diagnostics included).", "",
@@ -175,7 +212,7 @@ def main():
         plain = stretch_move(problem, given.steps)
         points = ours.draws.reshape(-1, len(problem.names))
         chosen = points[np.linspace(0, len(points) - 1, DENSE).astype(int)]
-        text = report(problem, against_dense(problem, chosen), ours, plain)
+        text = "\n".join([report(problem, against_dense(problem, chosen), ours, plain), *others(problem, ours)])
     given.out.mkdir(parents=True, exist_ok=True)
     (given.out / "README.md").write_text(text, encoding="utf-8")
     print(text)

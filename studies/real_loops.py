@@ -1,6 +1,6 @@
-"""Fit the eleven measured cycloidal units: convergence, preload trends, and small loops predicted from the large ones.
+"""The eleven measured cycloidal units: convergence, preload trends, small loops predicted from the large ones, modules withheld.
 
-    python studies/real_loops.py --data ../shared/data/cycloidal --out reports/real-loops
+    python studies/real_loops.py --data ../shared/data/cycloidal --out reports/real-loops --seconds 1200
 
 Data: github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0; read from where they are, not copied.
 """
@@ -12,16 +12,15 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-import json
 import time
 import warnings
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from real_loops_page import broken_assumptions, write_page
 
-from backdrive_bayes.commands.results import FitOptions, fit_unit
+from backdrive_bayes.commands.results import FitOptions, diagnose_unit, fit_unit
 from backdrive_bayes.engine.parameters import posterior_parameters
 from backdrive_bayes.engine.prediction import nodes, predict_angles
 from backdrive_bayes.records.history import noise_free_torque
@@ -29,40 +28,63 @@ from backdrive_bayes.records.unit_folder import read_unit
 
 K = 0.03
 PARAMETERS = ("clearance_rad", "friction_torque_Nm", "load_friction_ratio")
-CREDIT = "github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, Code/test_data, CC BY-SA 4.0"
 
 
-def study_unit(job) -> dict:
+def study_unit(folder: Path) -> dict:
     """Fit all loops, then the large ones alone, and predict the small ones from those."""
     warnings.simplefilter("ignore")
-    began, unit = time.perf_counter(), read_unit(job)
+    began, unit = time.perf_counter(), read_unit(folder)
     posterior, indicators = fit_unit(unit, FitOptions(k=K, seed=1))
     result = {"unit": unit.name, "all": indicators["convergence"], "seconds": round(time.perf_counter() - began, 1)}
     parameters = posterior_parameters(posterior)
     result["indicators"] = [{"file": r["file"], **r["indicators"]} for r in indicators["records"]]
     result["draws"] = {name: parameters[name].tolist() for name in PARAMETERS}
-    large = replace(unit, records=tuple(r for r in unit.records if r.name.startswith("large")))
+    result["left_rad"] = _left(posterior)
+    large = replace(unit, records=tuple(r for r in unit.records if r.name.startswith("large")), file_sha256="")
     alone, about = fit_unit(large, FitOptions(k=K, seed=2))
     result["large_only"] = about["convergence"]
-    result["small_predicted"] = _predict_small(unit, alone)
-    return result
+    result["small_predicted"], result["curves"] = _predict_small(unit, alone)
+    return result | {"broken": broken_assumptions(unit)}
+
+
+def _left(posterior) -> float:
+    """Rms of what the fit of all loops leaves of the small ones' settled blocks [rad]."""
+    square = []
+    for blocks, predicted in zip(posterior.records.blocks, posterior.predicted_rad, strict=True):
+        if blocks.name.startswith("small"):
+            left = (blocks.angle_rad - predicted)[blocks.leg > 0]
+            square.append((left - left.mean()) ** 2)
+    return float(np.sqrt(np.mean(np.concatenate(square))))
 
 
 def _predict_small(unit, posterior):
-    if not posterior.converged:
-        return None
-    hits, total, width, gap = 0, 0, [], []
+    """Scores of the small loops' prediction, and the first loop with it for the figure; offsets are taken out of every curve."""
+    rows, curves = [], {}
     for record in (r for r in unit.records if r.name.startswith("small")):
         pick = slice(None, None, 4)
         torque, _ = noise_free_torque(record.time_s[pick], record.torque_nm[pick])
-        curves = predict_angles(posterior, record.time_s[pick], torque)
-        lo, hi = np.quantile(curves, [0.05, 0.95], axis=0)
-        measured = record.angle_rad[pick][nodes(torque)]
-        hits += int(np.sum((measured >= lo) & (measured <= hi)))
-        total += measured.size
-        width.append(float(np.mean(hi - lo)))
-        gap.append(float(np.sqrt(np.mean((np.median(curves, axis=0) - measured) ** 2))))
-    return {"coverage_of_90": hits / total, "mean_width_rad": float(np.mean(width)), "rms_rad": float(np.mean(gap))}
+        found, measured = predict_angles(posterior, record.time_s[pick], torque), record.angle_rad[pick]
+        found = found - np.median(found - measured[nodes(torque)], axis=1, keepdims=True)
+        measured = measured[nodes(torque)]
+        lo, middle, hi = np.quantile(found, [0.05, 0.5, 0.95], axis=0)
+        rows.append((np.mean((measured >= lo) & (measured <= hi)), np.mean(hi - lo), np.sqrt(np.mean((middle - measured) ** 2))))
+        if not curves:
+            kept = {"torque_nm": torque[nodes(torque)], "measured": measured, "lo": lo, "middle": middle, "hi": hi}
+            curves = {name: values.tolist() for name, values in kept.items()}
+    coverage, width, rms = np.mean(rows, axis=0)
+    return {"coverage_of_90": float(coverage), "mean_width_rad": float(width), "rms_rad": float(rms)}, curves
+
+
+def withheld(folder: Path, module: str) -> dict:
+    """Whether a diagnosis without one module of the baseline names it."""
+    warnings.simplefilter("ignore")
+    unit = read_unit(folder)
+    baseline = tuple(m for m in FitOptions.baseline if m != module)
+    result, _ = diagnose_unit(unit, FitOptions(baseline, k=K, seed=1), sample=False)
+    answer = result["answer"]
+    likeliest = {row["effect"]: row["probability"] for row in result["which"][:3]}
+    return {"unit": unit.name, "module": module, "effects": answer["effects"], "likeliest": likeliest,
+            "credible_set_90": answer["credible_set_90"]}
 
 
 def trends(results) -> list[dict]:
@@ -97,24 +119,20 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/cycloidal"))
     parser.add_argument("--out", type=Path, default=Path("reports/real-loops"))
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seconds", type=float, default=1e9, help="nothing is begun after so many seconds")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     folders = sorted(p.parent for p in options.data.glob("*/unit.toml"))
-    results = []
-    with ProcessPoolExecutor(options.workers) as pool:
-        for result in pool.map(study_unit, folders):
-            results.append(result)
-            state = {k: result["all"][k] for k in ("converged", "max_rhat", "min_tail_ess", "contradictions")}
-            print(result["unit"], state, result["seconds"], "s, large only", result["large_only"]["converged"], flush=True)
-            print("  small predicted", result["small_predicted"], flush=True)
-            # Kept unit by unit: the whole takes long.
-            kept = [{k: v for k, v in r.items() if k != "draws"} for r in results]
-            (options.out / "real_loops.json").write_text(json.dumps({"credit": CREDIT, "units": kept, "trends": []}, indent=1))
-    rows = trends(results)
-    for row in rows:
-        print(row)
-    (options.out / "real_loops.json").write_text(json.dumps({"credit": CREDIT, "units": kept, "trends": rows}, indent=1))
+    jobs = [(study_unit, folder) for folder in folders]
+    jobs += [(withheld, folder, module) for module in ("geometric", "friction") for folder in folders]
+    began, fits, named = time.perf_counter(), [], []
+    for study, *given in jobs:
+        if time.perf_counter() - began > options.seconds:
+            break
+        (fits if study is study_unit else named).append(study(*given))
+        last = (fits if study is study_unit else named)[-1]
+        print({k: v for k, v in last.items() if k not in ("indicators", "draws", "curves")}, flush=True)
+        write_page(options.out, fits, named, trends(fits), len(folders))
 
 
 if __name__ == "__main__":

@@ -35,13 +35,13 @@ def library_terms():
 
 @one_thread()
 def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda text: None) -> tuple[Linear, ...]:
-    """The linear models of a unit about its modes, the joint one first; BadInput where its records leave nothing to infer from."""
+    """The linear models of a unit about its modes, the joint one first; BadInput where its records tell nothing."""
     note("reducing the records")
-    reduced = reduce_unit(without_wild(unit))
-    note("finding the modes")
     try:
+        reduced = reduce_unit(without_wild(unit))
+        note("finding the modes")
         return linearise(reduced, library_terms(), modules)
-    except np.linalg.LinAlgError:
+    except (np.linalg.LinAlgError, ZeroDivisionError):
         raise BadInput(unit.name, "records with noise and with an angle that moves", "equations without a solution") from None
 
 

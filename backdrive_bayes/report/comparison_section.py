@@ -25,8 +25,8 @@ def chapter(folder: Path) -> Chapter:
     figures = comparison_figures(result)
     level = result["level"]
     title = free("Comparison: " + ", ".join(result["names"]), 110)
-    kinds = ("comparison-loops", "comparison-ratios", "comparison-mechanism")
-    names = [n for kind in kinds for n in figures if n.startswith(kind)]
+    ratios = [n for n in figures if n.startswith("comparison-ratios")]
+    names = [n for n in ("comparison-loops", *ratios, "comparison-mechanism") if n in figures]
     return Chapter(
         title,
         [
