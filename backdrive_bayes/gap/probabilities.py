@@ -27,15 +27,15 @@ class Calibration:
     something unlisted. ``cover`` is what a 90 % set must gather.
     """
 
-    cool: float = 1.0
-    warm: float = 2.39
-    single: float = -1.96
-    second: float = -3.31
-    wave: float = -0.55
-    unlisted: float = -2.43
-    beside: float = -1.95
-    misfit: float = 0.87
-    usual: float = 1.63
+    cool: float = 1
+    warm: float = 1.88
+    single: float = -2.59
+    second: float = -2.7
+    wave: float = -0.91
+    unlisted: float = -2.2
+    beside: float = -2.88
+    misfit: float = 0.78
+    usual: float = 1.57
     cover: float = 0.93
 
 
