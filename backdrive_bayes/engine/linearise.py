@@ -68,7 +68,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     """
     fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))
     starts = _apart([*possible_starts(reduced), Distortion()], reduced.context)
-    trials = []
+    trials: list[tuple[float, Distortion, tuple[Group, ...]]] = []
     for start in starts:
         trial = _Search(reduced, effects, modules, fixed).run(start, TRIAL_STEPS)
         trials.append((trial.log_marginal, start, ()))

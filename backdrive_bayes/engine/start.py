@@ -40,7 +40,7 @@ def possible_starts(reduced: Reduced) -> list[Distortion]:
 
 def _oddest_offset(reduced) -> float:
     """Offset about which rising legs and mirrored falling ones agree best, up to an offset of the angle."""
-    legs = {1.0: [], -1.0: []}
+    legs: dict[float, list[np.ndarray]] = {1.0: [], -1.0: []}
     for blocks, angle in zip(reduced.blocks, reduced.angles, strict=True):
         for k in range(1 if blocks.direction.size > 1 else 0, blocks.direction.size):
             own, sign = blocks.leg == k, float(blocks.direction[k])

@@ -20,7 +20,7 @@ def effect_parameters(weighed: Weighed, properties, posterior: Posterior, effect
         size = weighed.jumps.size_rad
         return {"jump": {"median": size, "lo": size, "hi": size, "unit": "rad"}}
     if effect == ENCODER:
-        frequency = weighed.frequency.get(weighed.nearest(posterior.hypothesis), weighed.frequency[(ENCODER,)])
+        frequency = weighed.frequency.get(weighed.nearest(posterior.hypothesis or ()), weighed.frequency[(ENCODER,)])
         period = weighed.linear.reduced.angle_scale_rad / frequency
         return {"period": {"median": period, "lo": period, "hi": period, "unit": "rad"}}
     return _of_terms(weighed, posterior, effect, level)

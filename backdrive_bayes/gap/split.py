@@ -74,8 +74,8 @@ class Split:
         """Held-out squares by stage, each in the place of ``after`` with the simulator as it is in that of ``before``."""
         tuned = shrink(*self.fits, self.weight)
         group = min(self.linear.design.groups, key=lambda g: g.width)
-        bare = replace(self.linear, angles=tuple(self.gap), design=Design((group,)))
-        nothing = Fitted((), bare, np.zeros(group.width), np.zeros(group.width))
+        alone = replace(self.linear, angles=tuple(self.gap), design=Design((group,)))
+        nothing = Fitted((), alone, np.zeros(group.width), np.zeros(group.width))
         bare = shrink(nothing, nothing, self.weight).before
         after = {"simulated": bare, "retuned": tuned.before, "explained": tuned.after}
         return {stage: replace(tuned, before=bare, after=values) for stage, values in after.items()}
