@@ -164,7 +164,8 @@ def score(args) -> None:
     groups["swapped"] = swapped
     lines = [HEAD, f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
     lines += [_line(name, group) for name, group in groups.items() if group]
-    lines += ["", f"Failed: {len(failed)} {failed}.", "", planted_fault(true.values(), swapped), ""]
+    lines += ["", f"Diagnosed: {len(true)} of {args.pairs} pairs. Failed: {len(failed)} {failed}.", ""]
+    lines += [planted_fault(true.values(), swapped), ""]
     (args.out / "README.md").write_text("\n".join(lines))
     print("\n".join(lines))
 
