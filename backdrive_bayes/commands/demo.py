@@ -32,19 +32,19 @@ def run(args) -> int:
     if args.fleet:
         return _fleet(args.data / "fleet", out, args.seed)
     say("The packaged units are synthetic twins of published reducers, not measurements.")
-    check.run(Namespace(unit=args.data / "ugly", out=out / "ugly-check", seed=args.seed))
+    shared = {"baseline": BASELINE, "k": 0.03, "level": 0.9, "seed": args.seed, "no_figures": False, "force": False}
+    _call(check, [args.data / "ugly"], out=out / "ugly-check", **shared)
     codes, results = [], [out / name for name in UNITS]
-    defaults = {"baseline": BASELINE, "k": 0.03, "level": 0.9, "seed": args.seed, "no_figures": False, "force": False}
     for name, folder in zip(UNITS, results, strict=True):
         unit = args.data / name
-        check.run(Namespace(unit=unit, out=folder, seed=args.seed))
-        codes.append(fit.run(Namespace(unit=unit, out=folder, **defaults)))
+        _call(check, [unit], out=folder, **shared)
+        codes.append(_call(fit, [unit], out=folder, **shared))
         # A verdict rests on the diagnosis that lies beside the fit: structure counts.
-        diagnose.run(Namespace(unit=unit, out=folder, no_posterior=True, **defaults))
-        accept.run(Namespace(unit=folder, out=folder, limits=args.data / "limits.toml", model=[], batch=[], **defaults))
+        _call(diagnose, [unit, "--no-posterior"], out=folder, **shared)
+        _call(accept, [folder, "--limits", args.data / "limits.toml"], out=folder, **shared)
     both = out / "comparison"
-    compare.run(Namespace(units=list(results), out=both, claims="paper", rope=0.05, **defaults))
-    report.run(Namespace(results=[*results, both], out=out, seed=args.seed))
+    _call(compare, [*results, "--claims", "paper"], out=both, **shared)
+    _call(report, [*results, both], out=out, **shared)
     try:
         codes.append(_fleet(args.data / "fleet", out / "fleet", args.seed))
     except MissingExtra as missing:
@@ -54,8 +54,13 @@ def run(args) -> int:
 
 def _fleet(folder: Path, out: Path, seed: int) -> int:
     say("The packaged fleet is synthetic, of the model's own class: it shows the evaluation of many units and tests no model.")
-    options = ArgumentParser()
-    fleet.add_arguments(options)
-    code = fleet.run(options.parse_args([str(folder)], Namespace(out=out, seed=seed)))
-    report.run(Namespace(results=[out], out=out, seed=seed))
+    code = _call(fleet, [folder], out=out, seed=seed)
+    _call(report, [out], out=out, seed=seed)
     return code
+
+
+def _call(verb, words, **shared) -> int:
+    """Run a verb as its command line does, all that is not given at the verb's own defaults."""
+    options = ArgumentParser()
+    verb.add_arguments(options)
+    return verb.run(options.parse_args([str(w) for w in words], Namespace(**shared)))
