@@ -20,7 +20,8 @@ def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> di
     """The contract's ``next_test`` for the two hypotheses that are still most probable."""
     drops, linear = {}, pair[0].linear
     for text, (history, rate) in _tests(linear).items():
-        curves = [_predict(f, history, rate) for f in pair]
+        # Before the first reversal the initial state decides, and no test separates what nobody knows.
+        curves = [_predict(f, history, rate)[POINTS:] for f in pair]
         apart = curves[0] - curves[1]
         apart = apart - apart.mean()
         noise = linear.reduced.context.angle_noise
@@ -63,8 +64,8 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
     base = linear.reducer.ends(history, growth)
     mean = {n: weights[n] for n in base}
     angle = sum(base[n] @ mean[n] for n in base)
-    z, direction = history.z1, np.sign(history.z1 - history.z0)
-    slope = np.gradient(angle, np.arange(angle.size)) / np.maximum(np.abs(np.gradient(z, np.arange(z.size))), 1e-9)
+    step, direction = np.abs(history.z1 - history.z0), np.sign(history.z1 - history.z0)
+    slope = np.where(step > 1e-9, np.diff(angle, prepend=angle[0]) / np.maximum(step, 1e-9), 0.0)
     for effect in linear.effects:
         weight = weights.get(effect.name)
         if weight is None:
@@ -74,13 +75,12 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
             angle = angle + columns @ weight[: columns.shape[1]]
         elif isinstance(effect, FlankEffect):
             angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight
+        elif isinstance(effect, GrowthEffect):
+            by = linear.reducer.grown(history, mean, growth, ends=True)[:, effect.part] * context.law(log_rate)[effect.term]
+            angle = angle + (float(weight[0]) - getattr(linear.distortion, effect.parameter)) * by
         elif isinstance(effect, TangentEffect):
-            away = float(weight[0]) - getattr(linear.distortion, effect.parameter)
-            if isinstance(effect, GrowthEffect):
-                by = linear.reducer.grown(history, mean, growth, ends=True)[:, effect.part] * context.law(log_rate)[effect.term]
-            else:
-                by = {"offset": direction * slope, "lag_s": -rate * slope}[effect.parameter]
-            angle = angle + away * by
+            # The path itself is free of offset and lag: their whole size counts.
+            angle = angle + float(weight[0]) * {"offset": direction * slope, "lag_s": -rate * slope}[effect.parameter]
     return angle
 
 

@@ -7,7 +7,7 @@ import pytest
 from support.planted import prepared
 
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.gap import where
+from backdrive_bayes.gap import next_test, where
 from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink
 
 
@@ -85,3 +85,12 @@ def test_the_closed_fraction_has_its_ends():
     assert closed_fraction(4.0, 1.0, 1.0) == 1.0 and closed_fraction(4.0, 4.0, 1.0) == 0.0
     assert closed_fraction(4.0, 2.25, 1.0) == pytest.approx(0.5)
     assert closed_fraction(4.0, 100.0, 1.0) == -1.0 and closed_fraction(1.0, 0.0, 1.0) == 1.0
+
+
+def test_loops_that_are_proposed_stay_within_the_angles_that_were_measured():
+    """At turning points the torque stands still: a slope there must not divide by nothing."""
+    linear = prepared("sensor_lag")[0]
+    fitted = fit_hypothesis(linear, ("sensor_lag",), levels(linear, ("sensor_lag",)))
+    for text, (history, rate) in next_test._tests(linear).items():
+        angle = next_test._predict(fitted, history, rate)
+        assert 0.2 < np.abs(angle).max() < 2.0, text
