@@ -21,11 +21,9 @@ from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
 POWER = 0.4
-"""Power of the likelihood from which weights are drawn, scales seeing all of it (a coarsened posterior: Miller and
-Dunson, JASA 114,
-2019): no reducer is quite of the class. On clean units of two benches that share nothing with it 90 % intervals held
-the truth in .77
-and .82 of the cases at full power, in .87 and .94 at a half, in .93 and .97 at a third. The number was chosen on these two."""
+"""Power of the likelihood from which weights are drawn, scales seeing all of it (a coarsened posterior: Miller and Dunson, JASA
+114, 2019): no reducer is quite of the class. Chosen on the clean units of two benches with an earlier form of the class;
+reports/interval-coverage says how often intervals hold the truth with it now."""
 
 
 def library_terms():
