@@ -27,7 +27,7 @@ from backdrive_bayes.gap.properties import find_properties
 from backdrive_bayes.records.unit_folder import read_unit
 
 HOME = Path(__file__).parents[1] / "reports" / "diagnosis-calibration"
-START = Calibration(1.0, 2.0, -2.0, -3.0, -0.5, -2.5, -2.0, 1.0, 1.5, 0.9)
+START = Calibration(1.0, 2.0, -2.0, -3.0, -0.5, -2.5, -2.0, 0.2, 0.9)
 """Round numbers from which the search begins: one effect in seven units, a second in twenty, a temperature of twice the root."""
 SETS = 0.9
 """Coverage that credible sets are to have."""
@@ -39,6 +39,8 @@ benches in view: no bench here is wholly unseen."""
 FRESH = """Drawn with another seed (`studies/make_bench.py --units 40 --seed 2611`), weighed by the same code and scored with the
 package's numbers; nothing was chosen on these units."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
+POSITIVE = ("cool", "warm", "spread")
+"""Numbers that are searched on a logarithmic scale."""
 
 
 def weigh_unit(folder: Path, truth: dict) -> dict:
@@ -107,19 +109,17 @@ def best_calibration(benches) -> Calibration:
 
     def of(x):
         values = dict(zip(SET, x, strict=True))
-        values["cool"], values["warm"] = float(np.exp(x[0])), float(np.exp(x[1]))
+        values |= {n: float(np.exp(values[n])) for n in POSITIVE}
         for name in ("single", "second", "wave", "unlisted", "beside"):
             values[name] = min(float(values[name]), 0.0)
-        values["misfit"], values["usual"] = max(float(values["misfit"]), 0.0), float(np.clip(values["usual"], 0.9, 4.0))
         return replace(START, **values)
 
-    start = np.array([getattr(START, n) for n in SET])
-    start[:2] = np.log(start[:2])
+    start = np.array([np.log(getattr(START, n)) if n in POSITIVE else getattr(START, n) for n in SET])
 
     def cost(x):
         return -np.mean([log_score(rows, of(x)) for rows in benches]) + 0.002 * np.sum((x - start) ** 2)
 
-    simplex = np.vstack([start, start + np.diag(np.r_[0.6, 0.8, np.ones(start.size - 2)])])
+    simplex = np.vstack([start, start + np.diag([0.7 if n in POSITIVE else 1.0 for n in SET])])
     found = minimize(cost, start, method="Nelder-Mead", options={"maxiter": 200, "initial_simplex": simplex, "fatol": 1e-3})
     return replace(of(found.x), cover=conformal_cover(benches, of(found.x)))
 

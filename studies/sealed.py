@@ -41,9 +41,10 @@ def answer(job) -> dict:
 def row(result) -> str:
     """One line of the table."""
     top = ", ".join(f"{w['effect']} {w['probability']:.2f}" for w in result["which"][:3])
-    closed = result["shrink"]["closed_fraction"]["median"]
+    closed = result["shrink"]["closed_fraction"]
+    share = f"{closed['median']:.2f}" if closed else "–"
     named = "inconclusive" if result["inconclusive"] else " + ".join(result["answer"]["effects"]) or "none"
-    return f"| {result['folder']} | {named} | {top} | {closed:.2f} | {result['took_s']:.0f} |"
+    return f"| {result['folder']} | {named} | {top} | {share} | {result['took_s']:.0f} |"
 
 
 def main():

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,7 @@ def absolute(node, name):
     return ".".join([*base, *([node.module] if node.module else [])])
 
 
+@cache
 def imports_of(name, source=None):
     """Everything a module imports, at its top or inside functions, as dotted names."""
     found = set()

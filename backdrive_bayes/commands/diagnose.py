@@ -76,7 +76,8 @@ def _summarise(result: dict, sampled, out: Path) -> None:
         show_simulator(simulator, result["level"])
     elif not result["inconclusive"]:
         closed = result["shrink"]["closed_fraction"]
-        say(f"closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")
+        if closed is not None:
+            say(f"closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")
     if sampled is not None:
         show_indicators(sampled[1])
     say(f"written to {out}")

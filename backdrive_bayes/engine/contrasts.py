@@ -8,11 +8,12 @@ contrasts: between mirrored branches, rates, times and legs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.special import logsumexp
+from scipy.special import log_ndtr, logsumexp
 
 from backdrive_bayes.engine.design import Design, Group
 from backdrive_bayes.engine.linear import Linear
@@ -28,8 +29,8 @@ class Contrasts:
     """Effects' columns and the data with the class integrated: Gram matrices of what is left.
 
     ``gram`` (weights, weights), ``moment`` (weights,), ``total``; ``index`` numbers the group of a weight;
-    ``samples`` is the number of
-    independent contrasts.
+    ``samples`` is the number of independent contrasts. ``white`` (samples, weights) are the whitened columns and ``held`` what
+    the class holds of them, of which the Gram matrices are made.
     """
 
     names: tuple[str, ...]
@@ -39,33 +40,73 @@ class Contrasts:
     total: float
     samples: float
     noise_dof: float
+    white: np.ndarray
+    held: np.ndarray
 
-    def log_marginal(self, scale) -> float:
-        """Log marginal likelihood for standard deviations of the weights, up to a constant."""
-        on = scale > 0
-        inner = self.gram[np.ix_(on, on)] * np.outer(scale[on], scale[on])
-        inner[np.diag_indices_from(inner)] += 1.0
-        lower = cholesky(inner, lower=True, check_finite=False)
-        seen = solve_triangular(lower, scale[on] * self.moment[on], lower=True, check_finite=False)
-        chi2 = max(self.total - float(seen @ seen), 0.0)
-        dof = self.noise_dof + self.samples
-        return -0.5 * dof * np.log1p(chi2 / self.noise_dof) - float(np.log(np.diag(lower)).sum())
+    def joined(self, more: Contrasts) -> Contrasts:
+        """The same contrasts with further columns, made with the same linear model."""
+        across = self.white.T @ more.white - self.held.T @ more.held
+        return replace(
+            self,
+            names=(*self.names, *more.names),
+            index=np.r_[self.index, more.index + len(self.names)],
+            gram=np.block([[self.gram, across], [across.T, more.gram]]),
+            moment=np.r_[self.moment, more.moment],
+            white=np.hstack([self.white, more.white]),
+            held=np.hstack([self.held, more.held]),
+        )
+
+    def log_marginal(self, scale, one_way: Sequence[int] = ()) -> float:
+        """Log marginal likelihood for standard deviations of the weights, up to a constant; ``one_way`` numbers weights that have
+        half a normal prior, each counted as if it were the only one."""
+        on, lower, seen = self._solved(scale)
+        chi2, dof = self._chi2(seen), self.noise_dof + self.samples
+        found = -0.5 * dof * np.log1p(chi2 / self.noise_dof) - float(np.log(np.diag(lower)).sum())
+        for weight in one_way:
+            along = solve_triangular(lower, (on == weight).astype(float), lower=True, check_finite=False)
+            spread = np.sqrt((self.noise_dof + chi2) / dof) * np.linalg.norm(along)
+            found += np.log(2.0) + float(log_ndtr(along @ seen / spread))
+        return found
+
+    def gains(self, scale, columns, sizes) -> np.ndarray:
+        """Approximate gain in log marginal likelihood of each member (members, width) of further ``columns`` with standard
+        deviations ``sizes`` of their weights, beside weights of ``scale``; averaged over SIZES."""
+        whole = np.unique(columns)
+        at = np.searchsorted(whole, columns)
+        own, lower, seen = self._solved(scale)
+        across = solve_triangular(lower, scale[own, None] * self.gram[np.ix_(own, whole)], lower=True, check_finite=False)
+        precision = (self.noise_dof + self.samples) / (self.noise_dof + self._chi2(seen))
+        left = (self.moment[whole] - across.T @ seen)[at] * sizes
+        members = across.T[at]
+        gram = self.gram[columns[:, :, None], columns[:, None, :]] - members @ members.transpose(0, 2, 1)
+        gram *= sizes[:, :, None] * sizes[:, None, :]
+        found = []
+        for size in SIZES:
+            inner = np.eye(columns.shape[1]) + size**2 * gram
+            solved = np.linalg.solve(inner, left[:, :, None])[:, :, 0]
+            found.append(0.5 * precision * size**2 * np.sum(left * solved, axis=1) - 0.5 * np.linalg.slogdet(inner)[1])
+        return logsumexp(found, axis=0, b=SIZE_WEIGHTS[:, None])
 
     def chi2(self, scale) -> float:
         """What is left of the contrasts at the posterior mean, over their number."""
-        on = scale > 0
+        return self._chi2(self._solved(scale)[2]) / self.samples
+
+    def _chi2(self, seen) -> float:
+        return max(self.total - float(seen @ seen), 0.0)
+
+    def _solved(self, scale) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of the weights that are on, the Cholesky factor of their precision, and their scores under it."""
+        on = np.flatnonzero(scale > 0)
         inner = self.gram[np.ix_(on, on)] * np.outer(scale[on], scale[on])
         inner[np.diag_indices_from(inner)] += 1.0
         lower = cholesky(inner, lower=True, check_finite=False)
-        seen = solve_triangular(lower, scale[on] * self.moment[on], lower=True, check_finite=False)
-        return max(self.total - float(seen @ seen), 0.0) / self.samples
+        return on, lower, solve_triangular(lower, scale[on] * self.moment[on], lower=True, check_finite=False)
 
 
 def make_contrasts(linear: Linear, groups: tuple[Group, ...]) -> Contrasts:
-    """Contrasts of a unit for the linear model's effects and further ``groups``."""
+    """Contrasts of a unit for ``groups`` of columns."""
     core = [i for i, n in enumerate(linear.design.names) if n in _class_names(linear)]
-    effects = tuple(g for i, g in enumerate(linear.design.groups) if i not in core) + groups
-    design = Design(effects)
+    design = Design(groups)
     data = linear.whitened(design)
     own = np.isin(linear.design.index, core)
     scale = WIDENED * np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index[own]]
@@ -82,7 +123,14 @@ def make_contrasts(linear: Linear, groups: tuple[Group, ...]) -> Contrasts:
         data.total - float(angle @ angle),
         data.samples - float(np.sum(seen**2)),
         data.noise_dof,
+        data.x,
+        columns,
     )
+
+
+def effect_groups(linear: Linear) -> tuple[Group, ...]:
+    """Columns of the linear model's effects."""
+    return tuple(g for g in linear.design.groups if g.name not in _class_names(linear))
 
 
 def _class_names(linear):

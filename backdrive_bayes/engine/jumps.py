@@ -1,132 +1,147 @@
-"""Stick-slip: small jumps of the angle in the direction of motion, looked for in the samples themselves.
+"""Stick-slip: a sawtooth of the angle in the direction of motion, looked for in the samples themselves.
 
-Between jumps the angle hangs behind, at a jump it leaps ahead. Differences of means over half a correlation time before and
-after an instant show leaps above the slow noise; noise, vibration and an encoder's error leap either way alike.
+Between leaps the angle hangs behind, at a leap it catches up. Noise, vibration and an encoder's error have no such arrow: teeth
+the other way round are weighed against it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import logsumexp
 
 from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.periodic import HARMONICS
+from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
 
 STEEP = 6.0
 """Slopes beyond so many times the median are clearances being crossed: nothing is looked for there."""
-SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)
-SIZES = (3.0, 6.0, 12.0, 24.0)
-"""Shares of instants with a jump, and jump sizes in noise standard deviations, that are averaged over."""
-STRAY = 1e-3
-"""Share of instants at which something else moves the angle either way."""
-FEWEST = 6
-"""Jumps below which there is no stick-slip but single events."""
-LARGE = 5.0
-"""Noise standard deviations from which a leap is counted."""
-SAME, SHIFT = 0.0015, 0.008
-"""Distances in torque within which leaps are the same, and by which they are moved to see what chance gives."""
-MOST_REPEATED = 0.3
+SAMPLES = 4
+"""Samples in a correlation time of the noise, fewest samples in a tooth, and fewest teeth in a leg."""
+HEIGHTS = (0.5, 1.0, 1.6, 2.5)
+"""Heights of the teeth in spreads of the residuals that are averaged over; teeth without noise have 2.7."""
+RATIO = 1.35
+"""Ratio of the lengths that are averaged over, about the spread of a tooth's length."""
+SHORTEST_RUN = 20
+"""Samples between steep places from which teeth can be told from a slow trend, of degree ``TREND``."""
+TREND = 3
+SEEN = 0.5
+"""Share of contacts that stick whose teeth are high and long enough to be seen: a reading without teeth excludes no others."""
 
 
 @dataclass(frozen=True)
 class Jumps:
-    """Log Bayes factor of leaps ahead over leaps back, their number, and their typical size [rad]."""
+    """Log Bayes factor of teeth ahead over noise or teeth the other way, and the usual size of a leap [rad]."""
 
     log_factor: float
-    count: int
     size_rad: float
 
 
-def find_jumps(linear: Linear) -> Jumps:
-    """Evidence for jumps in the direction of motion in all records together.
+def find_jumps(linear: Linear, wave: float | None = None) -> Jumps:
+    """Evidence for leaps in the direction of motion in all records together, which share the torque from leap to leap.
 
-    Leaps that come at the same torque on other legs are steps of the operator (teeth that engage) and no stick-slip.
+    ``wave`` is the frequency of an encoder's error, which is taken off: an error of the angle looks like teeth too.
     """
-    leaps, sizes, places = [], [], []
-    reduced, scale = linear.reduced, linear.reduced.torque_scale_nm
-    for record, blocks, trust, predicted, noise in zip(
-        reduced.unit.records, reduced.blocks, reduced.trust, linear.predicted, reduced.noise, strict=True
-    ):
-        found = _leaps(record, blocks, trust == 1.0, predicted * reduced.angle_scale_rad, noise)
-        if found is not None:
-            leap, size, time = found
-            leaps.append(leap)
-            sizes.append(size)
-            places += _places(blocks, time[leap > LARGE], scale)
-    if not leaps:
-        return Jumps(0.0, 0, 0.0)
-    leap, size = np.concatenate(leaps), np.concatenate(sizes)
-    large = leap > LARGE
-    count = int(large.sum())
-    factor = _mixture(leap) - _mixture(-leap)
-    if count < FEWEST or _repeated(places) > MOST_REPEATED:
-        return Jumps(min(factor, 0.0), count, 0.0)
-    return Jumps(factor, count, float(np.median((leap * size)[large])))
+    return weigh_teeth(residual_series(linear, wave))
 
 
-def _places(blocks, times, scale):
-    """Torques of leaps on each leg, mirrored where it falls."""
-    torque = np.interp(times, blocks.mid_s, blocks.torque_nm) / scale
-    leg = blocks.leg[np.clip(np.searchsorted(blocks.begin_s, times, side="right") - 1, 0, blocks.count.size - 1)]
-    return [torque[leg == k] * blocks.direction[k] for k in range(blocks.direction.size)]
+def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
+    """Residuals of each record that has enough of them."""
+    reduced, found = linear.reduced, []
+    for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
+        slope = np.abs(np.gradient(linear.predicted[r], blocks.mid_s))
+        wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
+        calm = (wide < STEEP * np.median(slope)) & (reduced.trust[r] == 1.0)
+        block = np.clip(np.searchsorted(blocks.begin_s, record.time_s, side="right") - 1, 0, blocks.count.size - 1)
+        leg, angle = np.where(calm, blocks.leg, -1)[block], np.interp(record.time_s, blocks.mid_s, linear.predicted[r])
+        rest = record.angle_rad - angle * reduced.angle_scale_rad
+        if wave is not None:
+            rest = without_wave(rest, angle, leg, wave)
+        step = float(np.median(np.diff(record.time_s)))
+        width = max(1, round(noise.correlation_time_s / SAMPLES / step))
+        series = even_series(rest * blocks.direction[blocks.leg[block]], leg, width)
+        if series is not None:
+            found.append(Teeth(series, width * step * float(reduced.context.rate[r])))
+    return found
 
 
-def _repeated(places) -> float:
-    """Share of leaps that come again at the same torque on other legs, beyond chance (leaps moved by SHIFT)."""
-    excess, total = 0.0, 0
-    for k, own in enumerate(places):
-        others = np.sort(np.concatenate([p for i, p in enumerate(places) if i != k] or [np.empty(0)]))
-        if own.size and others.size:
-            excess += np.sum(_near(own, others)) - 0.5 * sum(np.sum(_near(own + s, others)) for s in (-SHIFT, SHIFT))
-            total += own.size
-    return excess / max(total, 1)
+def without_wave(rest, angle, leg, frequency: float) -> np.ndarray:
+    """Residuals (samples,) less the wave of the angle, with its harmonics, that fits them best."""
+    known = leg >= 0
+    phase = 2 * np.pi * frequency * angle[known, None] * np.arange(1, HARMONICS + 1)
+    levels = (leg[known, None] == np.unique(leg[known])).astype(float)
+    columns = np.hstack([np.sin(phase), np.cos(phase), levels])
+    left = rest.copy()
+    left[known] -= columns @ np.linalg.lstsq(columns.T @ columns, columns.T @ rest[known], rcond=None)[0]
+    return left
 
 
-def _near(values, others):
-    at = np.searchsorted(others, values)
-    left, right = others[np.clip(at - 1, 0, others.size - 1)], others[np.clip(at, 0, others.size - 1)]
-    return np.minimum(np.abs(values - left), np.abs(values - right)) < SAME
+def even_series(signed, leg, width: int) -> Series | None:
+    """Means over ``width`` samples of residuals (samples,), less a slow trend of each run of one leg; leg -1 is left out."""
+    values, fresh = [], []
+    for run in np.split(np.arange(leg.size), np.flatnonzero(np.diff(leg)) + 1):
+        count = run.size // width
+        if leg[run[0]] >= 0 and count >= SHORTEST_RUN:
+            mean = signed[run[: count * width]].reshape(count, width).mean(axis=1)
+            basis = np.linalg.qr(np.vander(np.linspace(-1, 1, count), TREND + 1))[0]
+            values.append(mean - basis @ (basis.T @ mean))
+            fresh.append(np.arange(count) == 0)
+    return Series(np.concatenate(values), np.concatenate(fresh)) if values else None
 
 
-def _leaps(record, blocks, trusted, predicted_rad, noise):
-    """Differences of means in noise standard deviations, signed by the direction of motion, and that deviation [rad]."""
-    step = float(np.median(np.diff(record.time_s)))
-    half = max(2, int(round(0.5 * noise.correlation_time_s / step)))
-    if record.time_s.size < 40 * half:
-        return None
-    rest = record.angle_rad - np.interp(record.time_s, blocks.mid_s, predicted_rad)
-    mean = np.convolve(rest, np.full(half, 1.0 / half), "valid")
-    difference = mean[half:] - mean[:-half]
-    at = np.arange(difference.size) + half
-    time = record.time_s[at]
-    slope = np.abs(np.gradient(predicted_rad, blocks.mid_s))
-    block = np.clip(np.searchsorted(blocks.begin_s, time, side="right") - 1, 0, blocks.count.size - 1)
-    wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
-    direction = blocks.direction[blocks.leg[block]]
-    turning = np.abs(np.diff(np.r_[direction, direction[-1:]])) > 0
-    calm = (trusted & (wide < STEEP * np.median(slope)))[block] & ~np.convolve(turning, np.ones(4 * half), "same").astype(bool)
-    value, instant = (difference * direction)[calm], time[calm]
-    if value.size < 20:
-        return None
-    sd = max(1.4826 * float(np.median(np.abs(value - np.median(value)))), 1e-300)
-    # The leap is taken where it is largest in its neighbourhood, at the resolution of the differences.
-    pieces = value[: value.size // half * half].reshape(-1, half)
-    at = np.arange(pieces.shape[0]), np.argmax(np.abs(pieces - np.median(value)), axis=1)
-    largest, instants = pieces[at], instant[: pieces.size].reshape(pieces.shape)[at]
-    leap = (largest - np.median(value)) / sd / np.sqrt(1.0 + np.log(max(half, 1)) / 2)
-    return leap, np.full(leap.size, sd), instants
+@dataclass(frozen=True, eq=False)
+class Teeth:
+    """One record's residuals; ``step`` is the torque between its samples in shares of the largest."""
+
+    series: Series
+    step: float
+
+    @cached_property
+    def levels(self) -> list:
+        """The series, its means of two, four, ... samples, and the noise of each."""
+        found, series = [], self.series
+        while self._longest(series) >= SAMPLES:
+            found.append((series, fit_noise(series)))
+            series = series.halved()
+        return found
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Shortest and longest torque between leaps that can be seen."""
+        return SAMPLES * self.step, self._longest(self.series) * self.step
+
+    def gain(self, length: float, side: int) -> tuple[float, float]:
+        """Log Bayes factor of teeth of a length in torque over noise, and the leaps' size [rad]."""
+        if not self.lengths[0] <= length <= self.lengths[1]:
+            return 0.0, 0.0
+        samples, level = length / self.step, 0
+        while samples >= 4 * SAMPLES and level + 1 < len(self.levels):
+            samples, level = samples / 2, level + 1
+        series, noise = self.levels[level]
+        found = [[tooth_gain(series, noise, m, side * h, samples) for h in HEIGHTS] for m in (noise.memory, noise.memory**2)]
+        best = HEIGHTS[int(np.argmax(np.max(found, axis=0)))] * noise.scale
+        return _averaged(found), best
+
+    @staticmethod
+    def _longest(series: Series) -> float:
+        return np.diff(np.r_[np.flatnonzero(series.fresh), series.value.size]).max() / SAMPLES
 
 
-def _mixture(leap) -> float:
-    """Log likelihood ratio of jumps among Gaussian noise, on the positive side, averaged over their size and share."""
-    found, wide = [], 1.0 + SIZES[-1] ** 2
-    stray = np.log(STRAY) - 0.5 * np.log(wide) + 0.5 * leap**2 * (1 - 1 / wide)
-    for size in SIZES:
-        variance = 1.0 + size**2
-        either = -0.5 * np.log(variance) + 0.5 * leap**2 * (1 - 1 / variance)
-        ahead = np.where(leap > 0, either + np.log(2.0), -np.inf)
-        for share in SHARES:
-            jumps = np.logaddexp(np.log(1.0 - share - STRAY), np.log(share) + ahead)
-            found.append(np.sum(np.logaddexp(jumps, stray) - np.logaddexp(np.log1p(-STRAY), stray)))
-    return float(logsumexp(found) - np.log(len(found)))
+def weigh_teeth(records: list[Teeth]) -> Jumps:
+    """Evidence of all records; that of every length is averaged."""
+    if not records:
+        return Jumps(0.0, 0.0)
+    shortest, longest = min(t.lengths[0] for t in records), max(t.lengths[1] for t in records)
+    lengths = shortest * RATIO ** np.arange(1 + int(np.log(max(longest / shortest, 1.0)) / np.log(RATIO)))
+    ahead, back = (np.array([[t.gain(x, side) for t in records] for x in lengths]) for side in (1, -1))
+    total = ahead[:, :, 0].sum(axis=1)
+    best = ahead[int(np.argmax(total))]
+    against = np.logaddexp(0.0, _averaged(back[:, :, 0].sum(axis=1))) - np.log(2.0)
+    seen = _averaged(total) - float(against)
+    return Jumps(float(np.logaddexp(np.log(1.0 - SEEN), np.log(SEEN) + seen)), float(best[int(np.argmax(best[:, 0])), 1]))
+
+
+def _averaged(logs) -> float:
+    return float(logsumexp(logs) - np.log(np.size(logs)))

@@ -17,7 +17,7 @@ from backdrive_bayes.engine.design import (
 )
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales, whiten
-from backdrive_bayes.engine.periodic import PRICE, WAVE, clearest_wave, wave_group
+from backdrive_bayes.engine.periodic import PRICE, WAVE, clearest_wave, periodic_group
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
@@ -74,13 +74,15 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         trials.append((trial.log_marginal, start, ()))
         gain, frequency = clearest_wave(trial)
         if gain > 0:
-            wave = replace(wave_group(trial, frequency), name=WAVE)
+            wave = periodic_group(trial, frequency)
             beside = _Search(reduced, effects, modules, (*fixed, wave)).run(start, TRIAL_STEPS)
             trials.append((beside.log_marginal - PRICE, start, (wave,)))
     _, start, waves = max(trials, key=lambda found: found[0])
     joint = _Search(reduced, effects, modules, (*fixed, *waves)).run(start, STEPS, refine=True)
-    found, reach = [joint], replace(joint.distortion, offset=starts[0].offset)
-    bent = _bent(joint, reach)
+    reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, 0.0))
+    found, bent = [joint], _bent(joint, reach)
+    # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
+    reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
     for count in range(min(len(bent), MOST_BENT) + 1 if bent else 0):
         for some in itertools.combinations(bent, count):
             search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
@@ -146,6 +148,7 @@ class _Search:
         learnings = LEARNINGS if refine else 0
         covariances = reduced.covariances(reduced.slopes(reduced.angles, 2.0), jitter)
         laid, weights, start, refined = None, None, None, 0
+        idle: set[str] = set()
         for step in range(steps):
             if laid is None or (not refined and _far(laid, distortion, context)):
                 laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules), None
@@ -153,10 +156,10 @@ class _Search:
                 design = class_groups(reduced, reducer, distortion).joined(*self.fixed)
                 weights = design.split(self._solve(reducer, design, reduced.angles, covariances, None)[2].mean)
                 start = None
-            linear, start = self._linear(reducer, distortion, weights, covariances, start, jitter)
-            weights = linear.weights
+            linear, start = self._linear(reducer, distortion, weights, covariances, start, jitter, idle)
+            weights, before, idle = linear.weights, idle, idle | self._backward(linear)
             moved = self._moved(linear)
-            still = _length(moved, distortion, context) < 0.025 * LONGEST_STEP
+            still = idle == before and _length(moved, distortion, context) < 0.025 * LONGEST_STEP
             if learnings and (still or step >= 4):
                 found = learn_jitter(linear)
                 learnings, jitter = learnings - 1 if found != jitter else 0, found
@@ -180,7 +183,7 @@ class _Search:
             torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
-    def _linear(self, reducer, distortion, weights, covariances, start, jitter):
+    def _linear(self, reducer, distortion, weights, covariances, start, jitter, idle):
         core = class_groups(self.reduced, reducer, distortion, weights.get("clearance"))
         tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
         design = core.joined(*self.fixed, *tangents)
@@ -188,24 +191,24 @@ class _Search:
         angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
         if start is not None and start.size != len(design.groups):
             start = None
-        data, log_scale, solution = self._solve(reducer, design, angles, covariances, start)
+        data, log_scale, solution = self._solve(reducer, design, angles, covariances, start, idle)
         named = dict(zip(design.names, log_scale, strict=True))
         explained = design.predict(design.split(solution.mean))
         predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
         shared = (self.reduced, reducer, distortion, design, self.effects, angles, tuple(covariances), data)
         return Linear(*shared, named, solution, jitter, predicted), log_scale
 
-    def _solve(self, reducer, design, angles, covariances, start):
+    def _solve(self, reducer, design, angles, covariances, start, idle=frozenset()):
         priors = class_priors(reducer)
         for effect in self.effects:
-            free = self._acts(effect)
+            free = self._acts(effect) and effect.name not in idle
             level = effect.present(self.reduced.context) if free else effect.trace(self.reduced.context)
             priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.trust)
         scales = design.scales(priors)
         if start is not None:
-            return data, *find_scales(data, scales, start, 4)
+            return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean), 4)
         # Steps near zero torque are free play or clearance: two modes, of which the better is taken.
         found = []
         for level in FREE_PLAY:
@@ -222,6 +225,11 @@ class _Search:
             return self.only is None and effect is not BENCH_HYSTERESIS
         names = self.only or [n for n in all_effects() if n not in BENDING]
         return effect.name in {t.name for n in names for t in all_effects().get(n, ())}
+
+    def _backward(self, linear) -> set[str]:
+        """Effects that are one way and want to act the other way: they stay traces from then on."""
+        found = (e for e in self.effects if isinstance(e, TangentEffect) and e.one_way and e.name in linear.weights)
+        return {e.name for e in found if linear.weights[e.name][0] < 0.0}
 
     def _moved(self, linear):
         weights = linear.weights

@@ -34,6 +34,8 @@ def possible_starts(reduced: Reduced) -> list[Distortion]:
     starts = []
     for used in ([1, 0, 0], [1, 1, 0], [1, 0, 1], [1, 1, 1]):
         found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(3)], rcond=None)[0] * used
+        if found[1] < 0.0:
+            continue
         starts.append(Distortion(offset, float(found[1] / fastest), 0.0, float(np.clip(found[2], -0.5, 0.5))))
     return starts
 

@@ -6,7 +6,14 @@ import textwrap
 from functools import partial
 from typing import Any
 
-from backdrive_bayes.figures import diagnosis_closed, diagnosis_map, diagnosis_residual, diagnosis_shift, diagnosis_simulated
+from backdrive_bayes.figures import (
+    diagnosis_closed,
+    diagnosis_map,
+    diagnosis_residual,
+    diagnosis_shift,
+    diagnosis_simulated,
+    residual_panels,
+)
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_which import bar_lines, draw_bars
 from backdrive_bayes.figures.diagnosis_words import answer_words, drawable
@@ -39,7 +46,7 @@ def figures_of(saved: Diagnosed) -> dict[str, Figure]:
     if saved.cells:
         row_in = diagnosis_map.row_height_in(saved, *diagnosis_map.ROW_IN)
         makers |= numbered("gap-map", diagnosis_map.draw, saved, everything, diagnosis_map.fitting(diagnosis_map.MAP_IN, row_in))
-    residual = sorted(diagnosis_residual.by_record(saved))
+    residual = sorted(residual_panels.by_record(saved))
     makers |= numbered("gap-residual", diagnosis_residual.draw, saved, residual, PER_FIGURE)
     if saved.shrink:
         makers |= numbered("closed-fraction", diagnosis_closed.draw, saved, everything, diagnosis_closed.AT_MOST)
@@ -106,7 +113,8 @@ def _which(axes, saved):
 
 def _closed(part, axes, saved, records):
     if not saved.added:
-        return _absent(axes, "How far does it close?", "no effect was added to the model")
+        inside = "part of the model class:\nnothing is added that could close it"
+        return _absent(axes, "How far does it close?", inside if saved.inside else "no effect was added to the model")
     diagnosis_closed.draw_before_after(axes, saved, records)
     if saved.effects == ["unknown"]:
         axes.set_title("How far with the best?", loc="left", fontweight="bold")

@@ -120,14 +120,21 @@ class Diagnosed:
     @property
     def added(self) -> bool:
         """Whether an effect was added to the model, or a simulator re-tuned: an unknown cause alone adds none, and closes nothing
-        by itself."""
+        by itself; a property is part of the class."""
+        if self.inside:
+            return False
         closed = self.shrink.get("closed_fraction") or {}
         return bool(self.shrink) and (self.effects != ["unknown"] or any(closed.get(end) for end in ("lo", "hi")))
 
     @property
+    def inside(self) -> bool:
+        """Whether all that is named lies inside the class, which has it before and after: such a diagnosis closes nothing."""
+        return bool(self.effects) and "closed_fraction" in self.shrink and self.shrink["closed_fraction"] is None
+
+    @property
     def shifts(self) -> list[dict]:
         """Shifts of the baseline's parameters, largest first; empty where nothing was added to the model."""
-        found = (self.result.get("parameter_shift") or []) if self.enlarged and self.effects else []
+        found = (self.result.get("parameter_shift") or []) if self.enlarged and self.effects and not self.inside else []
         return sorted(found, key=lambda s: -abs(s["shift_sd"] or 0.0))
 
     @property

@@ -4,22 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.figures.diagnosis_residual import by_record
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.style import (
-    ARCMIN_PER_RAD,
-    BLUE,
-    FALLING,
-    GREY,
-    ORANGE,
-    PER_FIGURE,
-    RISING,
-    TORQUE_TICKS,
-    few_ticks,
-    legend_below,
-    new_figure,
-    styled,
-)
+from backdrive_bayes.figures.residual_panels import by_record, draw_panels
+from backdrive_bayes.figures.style import BLUE, ORANGE, PER_FIGURE, few_ticks, legend_below, new_figure, styled
 
 CAPTION = (
     "What separates the simulator from the unit. Above: shares of the gap above the noise on held-out data that re-tuning the "
@@ -45,7 +32,7 @@ def draw(saved: Diagnosed):
         shown = [(h, part) for h, part in zip(heights, (_bars, _curves), strict=True) if h]
         parts = figure.subfigures(len(shown), 1, squeeze=False, height_ratios=[h for h, _ in shown])[:, 0]
         for part, (_, draw_part) in zip(parts, shown, strict=True):
-            draw_part(part, saved, bars if draw_part is _bars else (records, entries, stages))
+            draw_part(part, saved, bars if draw_part is _bars else (records, stages))
     return figure
 
 
@@ -84,26 +71,9 @@ def _bars(part, saved, shown):
 
 
 def _curves(part, saved, given):
-    records, entries, stages = given
-    panels = part.subplots(len(stages), len(records), sharex="col", sharey="row", squeeze=False)
-    for column, record in zip(panels.T, records, strict=True):
-        for axes, (key, _) in zip(column, stages, strict=True):
-            _curve(axes, entries[record], key)
-        column[0].set_title(saved.labels[record])
-        column[-1].set_xlabel("torque [N·m]")
-    for axes, (_, name) in zip(panels[:, 0], stages, strict=True):
-        axes.set_ylabel(f"{name}\n[arcmin]")
-    for axes in panels.ravel():
-        few_ticks(axes, TORQUE_TICKS[len(records)], 4)
-    part.align_ylabels(panels[:, 0])
+    panels = draw_panels(part, saved, *given, _line, 4)
     legend_below(part, panels[0, 0], columns=3)
 
 
-def _curve(axes, entry, key):
-    torque, direction = np.asarray(entry["torque_Nm"]), np.asarray(entry["direction"])
-    angle, noise = np.asarray(entry[key]) * ARCMIN_PER_RAD, entry["noise_rad"] * ARCMIN_PER_RAD
-    axes.axhspan(-noise, noise, color=GREY, alpha=0.35, linewidth=0, label="noise, ±1 standard deviation")
-    axes.axhline(0, color="black", linewidth=0.6)
-    for sign, look, name in ((1, RISING, "rising torque"), (-1, FALLING, "falling torque")):
-        own = np.where(direction == sign, angle, np.nan)
-        axes.plot(torque, own, label=name, linewidth=0.9, **look)
+def _line(axes, torque, angle, own, look, name):
+    axes.plot(torque, np.where(own, angle, np.nan), label=name, linewidth=0.9, **look)

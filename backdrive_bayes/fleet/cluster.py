@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import functools
 import itertools
 import logging
 import sys
+import threading
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,6 +21,8 @@ RETRIES = 2
 """Times that a unit is tried again after it took its worker down."""
 WAIT_S = 30
 """For a scheduler to answer and to show its workers [s]."""
+LOOP_WAIT_S = 120
+"""For a thread of this process to run its event loop [s]: only a machine without any time to spare takes longer."""
 REPLACE_S = 2
 """Between two looks whether a worker is missing [s]."""
 SETTINGS = {
@@ -39,6 +44,28 @@ class Tls:
     key: str
 
 
+@functools.cache
+def event_loop():
+    """The tornado loop of all clients and clusters of this process, running in a thread of its own.
+
+    Clients and clusters that are given none start one each, wait ten seconds for its thread and then fail on an assertion,
+    which happens on a busy machine (``distributed.utils.LoopRunner``, no option changes it).
+    """
+    from tornado.ioloop import IOLoop
+
+    ready, found = threading.Event(), []
+
+    async def run() -> None:
+        found.append(IOLoop.current())
+        ready.set()
+        await asyncio.Event().wait()
+
+    threading.Thread(target=lambda: asyncio.run(run()), daemon=True, name="loop of dask").start()
+    if not ready.wait(LOOP_WAIT_S):
+        raise BadInput("fleet", f"a thread that starts within {LOOP_WAIT_S} s", "none: the machine has no time to spare")
+    return found[0]
+
+
 @contextlib.contextmanager
 def local(workers: int) -> Iterator:
     """A client of a cluster on this machine, processes of one thread each that are replaced whenever they die."""
@@ -49,14 +76,15 @@ def local(workers: int) -> Iterator:
     _silence_tracker()
     logging.getLogger("tornado.application").setLevel(logging.CRITICAL)
     with dask.config.set(SETTINGS), contextlib.ExitStack() as stack:
+        loop = event_loop()
         cluster = distributed.LocalCluster(
-            n_workers=0, threads_per_worker=1, processes=True, host="127.0.0.1",
+            n_workers=0, threads_per_worker=1, processes=True, host="127.0.0.1", loop=loop,
             dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
         )  # fmt: skip
         stack.enter_context(cluster)
         cluster.scale(workers)  # unlike a number given above it bears with workers that die while they start
         watch = cluster.periodic_callbacks["replace"] = PeriodicCallback(lambda: _replace(cluster), 1000 * REPLACE_S)
-        cluster.loop.add_callback(watch.start)
+        loop.add_callback(watch.start)
         client = stack.enter_context(distributed.Client(cluster, set_as_default=False))
         with contextlib.suppress(TimeoutError):
             client.wait_for_workers(workers, timeout=WAIT_S)
@@ -84,8 +112,9 @@ def joined(address: str, tls: Tls | None = None) -> Iterator:
         security = distributed.Security(
             require_encryption=True, tls_ca_file=tls.ca, tls_client_cert=tls.cert, tls_client_key=tls.key
         )
+    options = {"security": security, "timeout": WAIT_S, "set_as_default": False, "loop": event_loop()}
     try:
-        client = distributed.Client(address, security=security, timeout=WAIT_S, set_as_default=False)
+        client = _connected(distributed.Client, address, options)
     except (OSError, ValueError, TypeError) as error:
         expected = "the address of a running scheduler, such as tcp://host:8786"
         raise BadInput("--scheduler", expected, f"{address} ({error or type(error).__name__})") from None
@@ -95,6 +124,18 @@ def joined(address: str, tls: Tls | None = None) -> Iterator:
         except TimeoutError:
             raise BadInput("--scheduler", "a scheduler with workers", f"none at {address} after {WAIT_S} s") from None
         yield client
+
+
+def _connected(kind, address: str, options: dict):
+    """A client; one that does not connect is closed here, for dask's garbage collection may ask the loop to wait for itself."""
+    client = kind.__new__(kind)
+    try:
+        client.__init__(address, **options)
+    except BaseException:
+        with contextlib.suppress(Exception):
+            client.close()
+        raise
+    return client
 
 
 def dashboard(client) -> str | None:

@@ -124,7 +124,8 @@ class _Found:
         # A process of each leg's own fits what is held out by itself: something unknown closes nothing.
         before, after = self._fitted(()), self._fitted(tuple(e for e in effects if e != "unknown"))
         shrunk = shrink(before, after, gap.weight)
-        closed = shrunk.closed("after", self.rng, LEVEL)
+        closed = self._closed(effects, shrunk)
+        named = effects
         if self._hollow(effects, closed):
             answers = _doubted(answers, likeliest)
             effects = ("unknown",)
@@ -150,7 +151,7 @@ class _Found:
             "where": self._where(gap),
             "which": self._which(answers, effects, posterior),
             "answer": {"effects": [] if inconclusive else list(effects), "credible_set_90": probabilities.credible_set(answers)},
-            "shrink": self._shrink(shrunk, closed, none, posterior),
+            "shrink": self._shrink(shrunk, named, closed, none, posterior),
             "next_test": self._next_test(answers),
             "parameter_shift": _shifts(none, posterior),
             "residual": self._residual(before, after),
@@ -189,8 +190,14 @@ class _Found:
     def _hollow(self, effects, closed) -> bool:
         """Whether a name explains too little of held-out data to be one."""
         names = set(effects) - {p.name for p in self.properties} - {STICK_SLIP, "unknown", *self.withheld}
-        gap = self.weighed.left[()] > probabilities.CALIBRATION.usual
-        return bool(names) and gap and closed["hi"] < LEAST_CLOSED
+        gap = probabilities.log_misfit(self.weighed.left[()], probabilities.CALIBRATION.spread) > 0
+        return bool(names) and gap and closed is not None and closed["hi"] < LEAST_CLOSED
+
+    def _closed(self, effects, shrunk, fold=None) -> dict | None:
+        """Closed fraction of one fold or of all; None where only properties are named: the class holds them before and after."""
+        if effects and set(effects) <= {p.name for p in self.properties}:
+            return None
+        return shrunk.closed("after", self.rng, LEVEL, fold)
 
     def _records(self):
         reduced = self.linear.reduced
@@ -217,7 +224,7 @@ class _Found:
             rows.append({"effect": label, "probability": float(p)} | ({"parameters": found} if found else {}))
         return rows
 
-    def _shrink(self, shrunk, closed, none, posterior):
+    def _shrink(self, shrunk, named, closed, none, posterior):
         widest = int(np.argmax(posterior.records.amplitude_nm))
         change = {}
         for key, drawn in (("before", none), ("after", posterior)):
@@ -230,7 +237,7 @@ class _Found:
             **_rms(shrunk),
             "closed_fraction": closed,
             "records": [
-                {"record": name, **_rms(shrunk, fold), "closed_fraction": shrunk.closed("after", self.rng, LEVEL, fold)}
+                {"record": name, **_rms(shrunk, fold), "closed_fraction": self._closed(named, shrunk, fold)}
                 for fold, name in enumerate(shrunk.names)
             ],
             "indicators_at": self._records()[widest],

@@ -6,28 +6,29 @@ import itertools
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
-from backdrive_bayes.engine.contrasts import SIZE_WEIGHTS, SIZES, averaged, make_contrasts
+from backdrive_bayes.engine.contrasts import SIZES, Contrasts, averaged, effect_groups, make_contrasts
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
-from backdrive_bayes.engine.periodic import AMPLITUDE, FREQUENCIES, wave_group, with_wave
+from backdrive_bayes.engine.periodic import AMPLITUDE, COARSE, fine_bank, wave_group, with_wave
 from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
+from backdrive_bayes.mechanics.effect import TangentEffect
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 
 ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
+WAVES = "waves"
 MODULE_CHANGE = 0.05
 """Usual change of a module in shares of itself."""
 KINDS = (UNEXPLAINED, "module_change", "uneven", "step")
 """What something unlisted may be: a process on each leg, a module that changes in time, legs of two directions that part, a step
 in time; each as likely."""
 PAIRED = 6
-"""Effects that are tried in pairs: those that explain most alone."""
+"""Effects that are tried in pairs: those that explain most alone, and the first of them with every other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,19 +61,25 @@ class Weighed:
 def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
     """Weigh none, every effect and the pairs of the most promising about every mode; ``allowed`` restricts the names."""
     jumps = find_jumps(linears[0])
-    tables = [_Table(linear, jumps.log_factor > 0) for linear in linears]
+    tables = [_Table(linear, jumps) for linear in linears]
     names = [n for n in (*tables[0].terms, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
     level = [_level(table, names) if len(tables) > 1 else 0.0 for table in tables]
 
-    def best_mode(hypothesis):
+    def best_mode(hypothesis, jumps=jumps):
         leap = jumps.log_factor if STICK_SLIP in hypothesis else 0.0
         found = [table.log_marginal(hypothesis) + leap + lift for table, lift in zip(tables, level, strict=True)]
         return max(found), int(np.argmax(found))
 
     found = {h: best_mode(h) for h in [(), *((n,) for n in names)]}
-    promising = sorted(names, key=lambda n: -found[(n,)][0])[:PAIRED]
-    found |= {h: best_mode(h) for h in itertools.combinations(sorted(promising), 2)}
-    none = found[()][0]
+    order = sorted(names, key=lambda n: -found[(n,)][0])
+    pairs = {tuple(sorted(p)) for p in (*itertools.combinations(order[:PAIRED], 2), *((order[0], n) for n in order[1:]))}
+    none, beside = found[()][0], jumps
+    # An encoder's wave and teeth are not to speak for both from the same leaps.
+    if (ENCODER, STICK_SLIP) in pairs and max(found[(ENCODER,)][0] - none, jumps.log_factor) > 0:
+        beside = find_jumps(linears[0], tables[0].frequency[(ENCODER,)])
+        for table in tables:
+            table.jumping[True] = _traces(beside)
+    found |= {h: best_mode(h, beside if ENCODER in h else jumps) for h in sorted(pairs)}
     return Weighed(
         tuple(linears),
         {h: mode for h, (_, mode) in found.items()},
@@ -94,28 +101,34 @@ def _level(table: _Table, names) -> float:
     scales = linear.design.scales(levels(linear, best))
     start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
     log_scale, solution = find_scales(linear.data, scales, start)
-    return solution.log_marginal + linear.data.log_volume + scales.log_prior(log_scale) - log[best]
+    # The solution knows the frequency of a wave: what its search costs is not part of the level.
+    return solution.log_marginal + linear.data.log_volume + scales.log_prior(log_scale) - log[best] - table.price.get(best, 0.0)
 
 
 class _Table:
     """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods."""
 
-    def __init__(self, linear: Linear, jumps: bool):
-        bank = replace(wave_group(linear, FREQUENCIES), name="bank")
+    def __init__(self, linear: Linear, jumps: Jumps):
+        waves = replace(wave_group(linear, COARSE.waves), name=WAVES)
         unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
-        self.linear, self.contrasts = linear, make_contrasts(linear, (*unlisted, bank))
+        self.linear, self.contrasts = linear, make_contrasts(linear, (*effect_groups(linear), *unlisted))
+        self.waved = self.contrasts.joined(make_contrasts(linear, (waves,)))
         contrasts, context = self.contrasts, linear.reduced.context
         effects = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}
         self.names = contrasts.names
         self.trace = np.array([trace_of(linear, effects[n]) if n in effects else 0.0 for n in self.names])
         usual = {n: e.present(context) for n, e in effects.items()} | {"module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
-        listed = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()}
-        self.terms = {n: t for n, t in listed.items() if any(x in self.names for x in t)} | {UNEXPLAINED: (UNEXPLAINED,)}
-        # Jumps leave traces in the block means that no slow model explains.
-        self.jumping = {UNEXPLAINED} if jumps else set()
+        # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
+        self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
+        one_way = [n for n, e in effects.items() if isinstance(e, TangentEffect) and e.one_way and n in self.names]
+        self.one_way = {n: np.flatnonzero(contrasts.index == self.names.index(n)).tolist() for n in one_way}
+        # What teeth leave in the block means, without and with an encoder's wave beside.
+        self.jumping = {False: _traces(jumps), True: _traces(jumps)}
         self.frequency: dict[tuple[str, ...], float] = {}
-        self._scans: dict[tuple, np.ndarray] = {}
+        self.price: dict[tuple[str, ...], float] = {}
+        self._scans: dict[frozenset[str], np.ndarray] = {}
+        self._near: dict[int, Contrasts] = {}
 
     def scale(self, on, size: float = 1.0) -> np.ndarray:
         """Standard deviations of all weights where the terms ``on`` are present at ``size`` times their usual level."""
@@ -130,68 +143,89 @@ class _Table:
         on = self._on(listed)
         kinds = [self._of_terms(hypothesis, on | {k}) for k in KINDS[:3]]
         if ENCODER not in hypothesis:
-            kinds.append(self._with_bank(on, "step", 1)[0])
+            kinds.append(self._with_step(on))
         return float(logsumexp(kinds) - np.log(len(kinds)))
 
     def _on(self, hypothesis) -> set:
-        return set().union(*(self.jumping if n == STICK_SLIP else self.terms.get(n, ()) for n in hypothesis))
+        terms = self.terms | {STICK_SLIP: tuple(self.jumping[ENCODER in hypothesis])}
+        return set().union(*(terms.get(n, ()) for n in hypothesis))
 
     def _of_terms(self, hypothesis, on) -> float:
         if ENCODER in hypothesis:
-            found, at = self._with_bank(on, "bank", 2)
+            found, frequency, price = self._with_wave(on)
             # Beside something unlisted, the first kind is the one whose columns a fit takes.
-            self.frequency.setdefault(hypothesis, float(FREQUENCIES[at]))
+            self.frequency.setdefault(hypothesis, frequency)
+            self.price.setdefault(hypothesis, price)
             return found
         if not on:
             return self.contrasts.log_marginal(self.scale(on))
-        return averaged([self.contrasts.log_marginal(self.scale(on, s)) for s in SIZES])
+        return averaged([self.contrasts.log_marginal(self.scale(on, s), self._one_way(on)) for s in SIZES])
+
+    def _one_way(self, on) -> list[int]:
+        """Numbers of the weights that cannot be negative."""
+        return [w for n in on for w in self.one_way.get(n, ())]
 
     def left(self, hypothesis) -> float:
         """Variance of the contrasts in noise units that a hypothesis leaves."""
         scale = self.scale(self._on(hypothesis), SIZES[-1])
-        if hypothesis in self.frequency:
-            at = int(np.argmin(np.abs(FREQUENCIES - self.frequency[hypothesis])))
-            scale[self._columns("bank", 2)[at]] = AMPLITUDE * SIZES[-1]
-        return self.contrasts.chi2(scale)
+        if hypothesis not in self.frequency:
+            return self.contrasts.chi2(scale)
+        at = int(np.argmin(np.abs(COARSE.members - self.frequency[hypothesis])))
+        near, fine, columns = self._about(at)
+        member = int(np.argmin(np.abs(fine.members - self.frequency[hypothesis])))
+        scale = _padded(scale, near)
+        scale[columns[member]] = SIZES[-1] * fine.sizes[member]
+        return near.chi2(scale)
 
-    def _columns(self, bank, width) -> np.ndarray:
-        """Numbers of a bank's columns, (members, width)."""
-        return np.flatnonzero(self.contrasts.index == self.names.index(bank)).reshape(-1, width)
+    def _about(self, at: int):
+        """Contrasts with the waves closely about one of the coarse bank, these waves, and the numbers of their columns."""
+        fine = fine_bank(COARSE.members[at])
+        if at not in self._near:
+            waves = replace(wave_group(self.linear, fine.waves), name=WAVES)
+            self._near[at] = self.contrasts.joined(make_contrasts(self.linear, (waves,)))
+        return self._near[at], fine, self.contrasts.index.size + fine.columns
 
-    def _with_bank(self, on, bank, width) -> tuple[float, int]:
-        """Log marginal likelihood averaged over a bank's members of ``width`` columns, and the best member."""
-        gains = self._scan(frozenset(on), bank, width)
+    def _with_step(self, on) -> float:
+        """Log marginal likelihood averaged over all instants of a step."""
+        columns = np.flatnonzero(self.contrasts.index == self.names.index("step"))[:, None]
+        gains = self.contrasts.gains(self.scale(on), columns, np.full(columns.shape, AMPLITUDE))
         at = int(np.argmax(gains))
         price = gains[at] - (logsumexp(gains) - np.log(gains.size))
+        return self._averaged(self.contrasts, on, columns[at], AMPLITUDE) - price
+
+    def _with_wave(self, on) -> tuple[float, float, float]:
+        """Log marginal likelihood averaged over the frequencies of a wave, the best one, and what it costs not to know it."""
+        key = frozenset(on)
+        if key not in self._scans:
+            scale = _padded(self.scale(on), self.waved)
+            self._scans[key] = self.waved.gains(scale, self.contrasts.index.size + COARSE.columns, COARSE.sizes)
+        gains = self._scans[key]
+        at = int(np.argmax(gains))
+        price = gains[at] - (logsumexp(gains) - np.log(gains.size))
+        near, fine, columns = self._about(at)
+        closely = near.gains(_padded(self.scale(on), near), columns, fine.sizes)
+        member = int(np.argmax(closely))
+        price += closely[member] - (logsumexp(closely) - np.log(closely.size))
+        return self._averaged(near, on, columns[member], fine.sizes[member]) - price, float(fine.members[member]), float(price)
+
+    def _averaged(self, contrasts, on, columns, sizes) -> float:
+        """Log marginal likelihood beside the terms ``on`` averaged over their size and over that of further columns."""
         found = []
         for size in SIZES if on else (1.0,):
+            scale = _padded(self.scale(on, size), contrasts)
+            log = []
             for member in SIZES:
-                scale = self.scale(on, size)
-                scale[self._columns(bank, width)[at]] = member * AMPLITUDE
-                found.append(self.contrasts.log_marginal(scale))
-        by_size = np.reshape(found, (-1, SIZES.size))
-        return float((averaged([averaged(f) for f in by_size]) if on else averaged(by_size[0])) - price), at
+                scale[columns] = member * sizes
+                log.append(contrasts.log_marginal(scale, self._one_way(on)))
+            found.append(averaged(log))
+        return averaged(found) if on else found[0]
 
-    def _scan(self, on, bank, width) -> np.ndarray:
-        """Approximate gain of every member of a bank beside the terms ``on``."""
-        if (on, bank) in self._scans:
-            return self._scans[on, bank]
-        c, scale, index = self.contrasts, self.scale(on), self._columns(bank, width)
-        own = np.flatnonzero(scale > 0)
-        inner = c.gram[np.ix_(own, own)] * np.outer(scale[own], scale[own])
-        inner[np.diag_indices_from(inner)] += 1.0
-        lower = cholesky(inner, lower=True, check_finite=False)
-        seen = solve_triangular(lower, scale[own] * c.moment[own], lower=True, check_finite=False)
-        across = solve_triangular(lower, scale[own, None] * c.gram[np.ix_(own, index.ravel())], lower=True, check_finite=False)
-        precision = (c.noise_dof + c.samples) / (c.noise_dof + max(c.total - float(seen @ seen), 0.0))
-        left = (c.moment[index.ravel()] - across.T @ seen).reshape(index.shape)
-        members = across.T.reshape(*index.shape, own.size)
-        gram = c.gram[index[:, :, None], index[:, None, :]] - np.einsum("fim,fjm->fij", members, members)
-        gains = []
-        for size in SIZES:
-            variance = (size * AMPLITUDE) ** 2
-            inner = np.eye(width) + variance * gram
-            solved = np.linalg.solve(inner, left[:, :, None])[:, :, 0]
-            gains.append(0.5 * precision * variance * np.sum(left * solved, axis=1) - 0.5 * np.linalg.slogdet(inner)[1])
-        self._scans[on, bank] = logsumexp(gains, axis=0, b=SIZE_WEIGHTS[:, None])
-        return self._scans[on, bank]
+
+def _traces(jumps: Jumps) -> set[str]:
+    """Jumps leave traces in the block means that no slow model explains."""
+    return {UNEXPLAINED} if jumps.log_factor > 0 else set()
+
+
+def _padded(scale, contrasts) -> np.ndarray:
+    """Standard deviations of further columns are zero."""
+    return np.r_[scale, np.zeros(contrasts.index.size - scale.size)]

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import gamma, logsumexp
 
 UNKNOWN, WAVE = "unknown", "encoder_error"
 
@@ -22,24 +22,26 @@ class Calibration:
     """Temperature ``cool`` + ``warm`` · √(largest log Bayes factor) at most, and log prior weights relative to none.
 
     ``single`` is that of one listed effect, ``second`` the further one of a second, ``wave`` the further one of an encoder error
-    (any period may come by), ``unlisted`` that of something unlisted, ``beside`` its further one beside a listed effect;
-    ``misfit`` times the logarithm of the contrasts' variance beyond ``usual``, where listed effects leave that much, speaks for
-    something unlisted. ``cover`` is what a 90 % set must gather.
+    (any period may come by), ``unlisted`` that of something unlisted, ``beside`` its further one beside a listed effect.
+    ``spread`` is that of the logarithm of the variance in noise units that a right hypothesis leaves. ``cover`` is what a
+    90 % set must gather.
     """
 
-    cool: float = 1
-    warm: float = 1.88
-    single: float = -2.59
-    second: float = -2.7
-    wave: float = -0.91
-    unlisted: float = -2.2
-    beside: float = -2.88
-    misfit: float = 0.78
-    usual: float = 1.57
-    cover: float = 0.93
+    cool: float = 2.63
+    warm: float = 1.1
+    single: float = -2.8
+    second: float = -2.82
+    wave: float = -2.03
+    unlisted: float = -1.64
+    beside: float = -2.97
+    spread: float = 0.32
+    cover: float = 0.92
 
 
 CALIBRATION = Calibration()
+DOF = 4
+"""Degrees of freedom of what is left: a noise level may be wrong by more than its usual error."""
+T_HEIGHT = gamma((DOF + 1) / 2) / gamma(DOF / 2) / np.sqrt(np.pi * DOF)
 TEMPERATURES = (1.0, np.exp(-1.0), np.exp(-2.0))
 """Shares of the highest temperature that are averaged over."""
 
@@ -77,12 +79,23 @@ def _weights(log_factor, left, temperature, calibration) -> dict[tuple[str, ...]
         weight[effects] = value / temperature + prior
         more = tuple(sorted((*effects, UNKNOWN)))
         # Something unlisted alone is due where no listed effect explains, not where none does.
-        excess = max(np.log(max(left[effects] if effects else least, 1e-3) / calibration.usual), 0.0)
+        misfit = log_misfit(left[effects] if effects else least, calibration.spread)
         unlisted_prior = calibration.beside if effects else calibration.unlisted
         explained = max(log_factor.get(more, value), value)
-        weight[more] = explained / temperature + prior + unlisted_prior + calibration.misfit * excess
+        weight[more] = explained / temperature + prior + unlisted_prior + misfit
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
+
+
+def log_misfit(left: float, spread: float) -> float:
+    """Log Bayes factor of something unlisted from the variance in noise units that listed effects leave.
+
+    Its logarithm is about zero where all is listed, Student-t of DOF with scale ``spread``. Something unlisted leaves that in one
+    half of the cases and in the other more, exponential in the logarithm; beyond DOF + 1, where the ratio is largest, it stays.
+    """
+    excess = min(np.log(max(left, 1e-3)), DOF + 1.0)
+    usual = -0.5 * (DOF + 1) * np.log1p((excess / spread) ** 2 / DOF) - np.log(spread / T_HEIGHT)
+    return float(np.logaddexp(0.0, -excess - usual if excess > 0 else -np.inf)) - float(np.log(2.0))
 
 
 def _beside(joint, name, probability, calibration):
@@ -114,7 +127,7 @@ def labels(joint: Mapping[tuple[str, ...], float]) -> dict[str, float]:
 
 def unlisted(joint: Mapping[tuple[str, ...], float]) -> float:
     """Probability that something acts which no listed effect explains."""
-    return float(sum(p for effects, p in joint.items() if UNKNOWN in effects))
+    return min(float(sum(p for effects, p in joint.items() if UNKNOWN in effects)), 1.0)
 
 
 def credible_set(answers: Mapping[str, float], cover: float = CALIBRATION.cover) -> list[str]:

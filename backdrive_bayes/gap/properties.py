@@ -1,8 +1,11 @@
 """Effects inside the class: properties of the operator, each with a practical size.
 
-Evidence against the class cannot find what the class holds. A second clearance is a separate step of the settled loading branch;
-slip of the output interface is angle gained near full load that a branch without slip does not gain. The probability of each is
-that of its size among those that are there, not among those that every reducer has.
+Evidence against the class cannot find what the class holds. What tells a property are the two branches of the settled loop
+beside each other. A clearance with drag is crossed while loading and not while unloading, so a second one is a step of the
+difference of the branches, in which elasticity cancels and to which friction adds no step. A clamp that slips yields more the
+nearer the loading branch comes to the tip, while contacts only harden. The probability of each is that of its size among those
+that are there, not among those that reducers have without it; steps of the unloading branch, where nothing is crossed, tell how
+uneven the reading is.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import expit, log_ndtr
+from scipy.special import expit, log_ndtr, logsumexp
 
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
@@ -19,23 +22,26 @@ from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.probabilities import CALIBRATION, probabilities
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.registry import UNKNOWN
 
 DRAWS = 120
-FALLEN = 0.1
-"""The first clearance is crossed where the slope has fallen to this share of its largest."""
-APART = 2.0
+MEDIAN_SQUARE = 0.455
+"""Median of the square of a standard normal variable."""
+TORQUES = np.geomspace(0.1, 0.6, 22)
+"""Torques, in shares of the largest, about which a second clearance may be crossed; all are as likely."""
+APART = 1.5
 """A second clearance is crossed at so many times the torque of the first at least."""
-LOWEST, HIGHEST = 0.1, 0.7
-"""Torques, in shares of the largest, between which a second clearance is looked for."""
-STEP = 0.006
-"""Standard deviation of steps that every reducer has (teeth that engage one after the other), in shares of the angle scale."""
-LARGE_STEP = 0.04
+WIDTHS = (1.15, 1.25, 1.45)
+"""A step is crossed from its torque divided by one of these to its torque times it; flanks as wide lie on both sides."""
+ONSETS = (0.6, 0.7, 0.8, 0.9)
+"""Torques from which on a clamp may slip on the settled loading branch; all are as likely."""
+BEFORE = 0.3
+"""Range of torque below the onset whose compliance is that without slip."""
+USUAL = 0.0015
+"""Standard deviation of apparent steps that every reducer has, in shares of the angle scale."""
+LARGE = 0.06
 """That of a second clearance or of slip where there is one."""
-ABOVE = 0.12
-"""A step stands out where the slope exceeds the neighbourhood's by this share."""
-MIDDLE, TIP = (0.35, 0.65), 0.7
-"""Torques from which the compliance is extrapolated, and from which on slip is looked for."""
+OWN = (0.01, 0.5)
+"""Share of reducers whose own clearance is crossed in steps within TORQUES, and the standard deviation of such steps."""
 SURE = 0.97
 """No property is more certain than this: thresholds are practical, not physical."""
 
@@ -51,81 +57,97 @@ class Property:
 
 
 @dataclass(frozen=True, eq=False)
-class LoadingBranch:
-    """Slopes dθ/dz (draws, points) of the settled loading branch at positive torques ``z`` (points,), over steps ``dz``."""
+class Branches:
+    """Draws of the settled loop at torques ``z`` (points,) from 0 to 1: angle of the loading branch and of the unloading one,
+    (draws, points), in angle scales."""
 
     z: np.ndarray
-    dz: np.ndarray
-    slope: np.ndarray
+    loading: np.ndarray
+    unloading: np.ndarray
 
 
-def loading_branch(linear: Linear, rng, draws: int = DRAWS) -> LoadingBranch:
-    """Draws of the settled loading branch of the class at the mode's scales."""
+def settled_branches(linear: Linear, rng, draws: int = DRAWS) -> Branches:
+    """Draws of the settled loop of the class at the mode's scales."""
     solution = linear.solution
     noise = np.sqrt(solution.variance) * rng.standard_normal((solution.root.shape[1], draws))
     weights = linear.design.split(solution.mean[:, None] + solution.root @ noise)
     half = np.unique(np.r_[0.0, np.geomspace(1e-4, 1.0, 160), np.linspace(0.0, 1.0, 81)])
     path = np.r_[half, half[::-1][1:], -half[1:], -half[::-1][1:], half[1:]]
     columns = linear.reducer.ends(through(np.arange(path.size, dtype=float), path, 1.0))
-    angle = sum(columns[n] @ weights[n] for n in columns)[-half.size :].T
-    step = np.diff(half)
-    return LoadingBranch(0.5 * (half[1:] + half[:-1]), step, np.diff(angle, axis=1) / step)
+    angle = sum(columns[n] @ weights[n] for n in columns).T
+    turned = half.size - 2
+    return Branches(half, angle[:, -half.size :], angle[:, turned : turned + half.size][:, ::-1])
 
 
-def second_clearance(branch: LoadingBranch) -> tuple[np.ndarray, float]:
-    """Angle of the largest separate step beyond the first clearance (draws,), and its torque (0 where there is none)."""
-    z, base = branch.z, _neighbourhood(branch)
-    mean, level = branch.slope.mean(axis=0), base.mean(axis=0)
-    peak = int(np.argmax(np.where(z < 0.35, mean, -np.inf)))
-    fallen = np.flatnonzero(mean[peak:] < FALLEN * mean[peak])
-    crossed = z[peak + fallen[0]] if fallen.size else HIGHEST
-    stands = (mean - level > ABOVE * np.maximum(level, 0.05)) & (z > max(APART * z[peak], crossed, LOWEST)) & (z < HIGHEST)
-    edges = np.flatnonzero(np.diff(np.r_[False, stands, False]))
-    best, place = np.zeros(branch.slope.shape[0]), 0.0
-    for a, b in edges.reshape(-1, 2):
-        angle = ((branch.slope - base) * branch.dz)[:, a:b].sum(axis=1)
-        if np.median(angle) > np.median(best):
-            best, place = angle, float(z[(a + b - 1) // 2])
-    return best, place
+def steps(z, angle, steeper: bool = True) -> np.ndarray:
+    """Angle that is crossed about every torque within every width beyond what the flanks give (the steeper of them, or their
+    mean), (draws, widths, torques)."""
+    found = []
+    for width in WIDTHS:
+        edges = [np.minimum(TORQUES * width**k, 1.0) for k in (-2, -1, 1, 2)]
+        outer, begin, end, beyond = (_at(z, angle, edge) for edge in edges)
+        below, above = (begin - outer) / (edges[1] - edges[0]), (beyond - end) / (edges[3] - edges[2])
+        flank = 0.5 * (below + above)
+        if steeper:
+            flank = np.where(below.mean(axis=0) > above.mean(axis=0), below, above)
+        found.append(end - begin - flank * (edges[2] - edges[1]))
+    return np.stack(found, axis=1)
 
 
-def slip_angle(branch: LoadingBranch) -> np.ndarray:
-    """Angle gained near full load beyond what the compliance of the middle gives, (draws,)."""
-    middle = (branch.z > MIDDLE[0]) & (branch.z < MIDDLE[1])
-    usual = np.median(branch.slope[:, middle], axis=1)
-    top = branch.z > TIP
-    return (branch.slope[:, top] - usual[:, None]) @ branch.dz[top]
+def slips(branches: Branches) -> np.ndarray:
+    """Angle gained from every onset to full load beyond what the compliance before the onset gives, (draws, onsets)."""
+    onset = np.array(ONSETS)
+    before, there = (_at(branches.z, branches.loading, x) for x in (onset - BEFORE, onset))
+    return branches.loading[:, -1:] - there - (there - before) / BEFORE * (1.0 - onset)
+
+
+def unevenness(branches: Branches) -> np.ndarray:
+    """Variance of what the unloading branch shows as steps beyond its own uncertainty, (widths,)."""
+    apparent = steps(branches.z, branches.unloading, steeper=False)
+    usual = np.median(apparent.mean(axis=0) ** 2, axis=1) / MEDIAN_SQUARE
+    return np.maximum(usual - np.median(apparent.var(axis=0), axis=1), 0.0)
+
+
+def present(sizes, uneven=0.0, own: float = 0.0) -> tuple[float, int]:
+    """Log Bayes factor that one of the sizes (draws, places), whichever, is of those that are there, and the likeliest place.
+
+    Sizes that are there are half-normal with LARGE, those that every reducer has normal about zero with USUAL and the variance
+    ``uneven``; in a share ``own`` of reducers without the property one place has a step of their own clearance (OWN).
+    """
+    mean, variance = sizes.mean(axis=0), sizes.var(axis=0) + USUAL**2 + uneven
+    there, other = (_gain(mean, variance, sd) for sd in (LARGE, OWN[1]))
+    without = logsumexp([0.0, logsumexp(other) - np.log(other.size)], b=[1.0 - own, own])
+    return float(logsumexp(there) - np.log(there.size) - without), int(np.argmax(there))
 
 
 def find_properties(weighed: Weighed, rng) -> tuple[Property, ...]:
     """Second clearance and interface slip of the operator that is left where the likeliest effects act."""
     linear = _beside_effects(weighed)
-    branch, scale, uneven = loading_branch(linear, rng), linear.reduced.angle_scale_rad, _unevenness(linear)
-    step, at = second_clearance(branch)
-    slip = slip_angle(branch)
-    return (
-        Property("second_backlash", present(step, uneven), step * scale, at * linear.reduced.torque_scale_nm),
-        Property("interface_slip", present(slip, uneven), slip * scale, TIP * linear.reduced.torque_scale_nm),
-    )
+    return properties_of(settled_branches(linear, rng), linear.reduced.angle_scale_rad, linear.reduced.torque_scale_nm)
 
 
-def present(values, uneven: float = STEP) -> float:
-    """Probability that a size known as ``values`` (draws,) is one of those that are there, not of those that all reducers have.
+def properties_of(branches: Branches, angle_scale_rad: float, torque_scale_nm: float) -> tuple[Property, ...]:
+    """Second clearance and interface slip of a settled loop."""
+    beyond = TORQUES >= APART * first_clearance(branches)
+    crossed = steps(branches.z, branches.loading - branches.unloading)[:, :, beyond]
+    uneven = unevenness(branches)
+    # The difference of two branches is as uneven as both.
+    twice = np.repeat(2.0 * uneven, beyond.sum())
+    second = crossed.reshape(crossed.shape[0], -1), np.tile(TORQUES[beyond], len(WIDTHS)), twice, OWN[0]
+    slip = slips(branches), np.array(ONSETS), uneven[1], 0.0
+    found = []
+    for name, (sizes, torques, variance, own) in (("second_backlash", second), ("interface_slip", slip)):
+        log_factor, best = present(sizes, variance, own)
+        probability = float(np.clip(expit(log_factor + CALIBRATION.single), 1.0 - SURE, SURE))
+        found.append(Property(name, probability, sizes[:, best] * angle_scale_rad, float(torques[best]) * torque_scale_nm))
+    return tuple(found)
 
-    Sizes of the first kind are half-normal with LARGE_STEP, of the second normal with ``uneven`` about zero.
-    """
-    mean, variance = float(np.mean(values)), float(np.var(values)) + uneven**2
-    usual = -0.5 * np.log(variance) - 0.5 * mean**2 / variance
-    whole = variance + LARGE_STEP**2
-    large = np.log(2.0) - 0.5 * np.log(whole) - 0.5 * mean**2 / whole + log_ndtr(mean * LARGE_STEP / np.sqrt(variance * whole))
-    return float(np.clip(expit(large - usual + CALIBRATION.single), 1.0 - SURE, SURE))
 
-
-def _unevenness(linear: Linear) -> float:
-    """Standard deviation of apparent steps: those of every reducer, and what a wave or leaps of the angle leave as such."""
-    waves = linear.design.predict(linear.weights, [n for n in ("wave", UNKNOWN.name) if n in linear.design.names] or ["none"])
-    height = max(float(np.std(w)) for w in waves)
-    return float(np.hypot(STEP, 2.0 * height))
+def first_clearance(branches: Branches) -> float:
+    """Torque of the steepest point of the loading branch below TORQUES."""
+    middle = 0.5 * (branches.z[1:] + branches.z[:-1])
+    slope = np.diff(branches.loading.mean(axis=0)) / np.diff(branches.z)
+    return float(middle[np.argmax(np.where(middle <= TORQUES[0], slope, -np.inf))])
 
 
 def _beside_effects(weighed: Weighed) -> Linear:
@@ -138,12 +160,15 @@ def _beside_effects(weighed: Weighed) -> Linear:
     return replace(linear, solution=find_scales(linear.data, scales, start)[1])
 
 
-def _neighbourhood(branch):
-    """Slope around each point without its own neighbours: mean of the medians on both sides, (draws, points)."""
-    z, found = branch.z, np.empty_like(branch.slope)
-    for i, at in enumerate(z):
-        below = (z > at / 1.8) & (z < at / 1.15)
-        above = (z > at * 1.15) & (z < at * 1.8)
-        sides = [np.median(branch.slope[:, s], axis=1) for s in (below, above) if s.sum() >= 2]
-        found[:, i] = np.mean(sides, axis=0) if sides else branch.slope[:, i]
-    return np.maximum(found, 0.0)
+def _gain(mean, variance, large):
+    """Log density of sizes of a half-normal prior less that of none, both known with ``variance``."""
+    whole = variance + large**2
+    shape = log_ndtr(mean * large / np.sqrt(variance * whole)) + 0.5 * mean**2 * large**2 / (variance * whole)
+    return np.log(2.0) - 0.5 * np.log(whole / variance) + shape
+
+
+def _at(z, angle, torques):
+    """Angle (draws, torques) between the points of a branch."""
+    right = np.clip(np.searchsorted(z, torques), 1, z.size - 1)
+    share = (torques - z[right - 1]) / (z[right] - z[right - 1])
+    return angle[:, right - 1] * (1.0 - share) + angle[:, right] * share

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -78,9 +79,11 @@ class PathEffect(Effect):
 class TangentEffect(Effect):
     """An effect that moves a nonlinear parameter of the operator: its column is the derivative of the present prediction.
 
-    ``parameter`` is the place of the parameter in :class:`Distortion`.
+    ``parameter`` is the place of the parameter in :class:`Distortion`; where ``one_way``, what the name stands for cannot be
+    negative.
     """
 
+    one_way: ClassVar[bool] = False
     parameter: str = ""
 
 

@@ -14,6 +14,10 @@ from scipy.optimize import minimize
 
 PRIOR_CORRELATION_TIME_S = 0.03
 PRIOR_LOG_SD = 0.5
+PRIOR_SD = np.array([4.0, 4.0, PRIOR_LOG_SD])
+"""Of the log standard deviations about what the spectrum's ends tell, and of the log correlation time."""
+POLISHING = 4
+"""Newton steps after the search, which stops where the likelihood is flat to its eighth digit: its last bits must not matter."""
 WINDOWS_PER_SEGMENT = 16
 TREND_DEGREE = 3
 SHORTEST_WINDOW = 16
@@ -94,12 +98,16 @@ class _Spectrum:
     step_s: float
 
     def cost(self, theta):
-        """Whittle's negative log likelihood of log(correlated), log(white), log(correlation time)."""
+        """Whittle's negative log likelihood of log(correlated), log(white), log(correlation time), and its gradient (3,)."""
         correlated, white, correlation = np.exp(theta)
-        phi = np.exp(-self.step_s / correlation)
-        model = correlated**2 * (1 - phi**2) / (1 - 2 * phi * np.cos(self.omega) + phi**2) + white**2
-        model += 1e-9 * self.power.mean() + 1e-40
-        return self.weight * np.sum(np.log(model) + self.power / model)
+        phi, cosine = np.exp(-self.step_s / correlation), np.cos(self.omega)
+        below = 1 - 2 * phi * cosine + phi**2
+        slow = correlated**2 * (1 - phi**2) / below
+        model = slow + white**2 + 1e-9 * self.power.mean() + 1e-40
+        by_phi = -2 * correlated**2 * (phi * below + (1 - phi**2) * (phi - cosine)) / below**2
+        slopes = np.stack([2 * slow, np.full_like(slow, 2 * white**2), by_phi * phi * self.step_s / correlation])
+        fit = self.power / model
+        return self.weight * np.sum(np.log(model) + fit), self.weight * slopes @ ((1 - fit) / model)
 
 
 def _longest(record: ChannelRecord) -> int:
@@ -140,27 +148,31 @@ def _fit_spectra(spectra):
     centre = np.array([0.5 * low, 0.5 * high, np.log(PRIOR_CORRELATION_TIME_S)])
 
     def cost(theta):
-        return sum(s.cost(theta) for s in spectra) + 0.5 * np.sum(((theta - centre) / [4.0, 4.0, PRIOR_LOG_SD]) ** 2)
+        away = (theta - centre) / PRIOR_SD
+        found = [s.cost(theta) for s in spectra]
+        return sum(f for f, _ in found) + 0.5 * away @ away, sum(g for _, g in found) + away / PRIOR_SD
 
     floor = centre - [12, 12, 0]
     floor[2] = np.log(min(s.step_s for s in spectra))
     bounds = list(zip(floor, centre + [12, 12, 6], strict=True))
     shifts = ((0.0, 0.0), (-1.5, -1.0), (-1.0, 1.0))
     starts = [np.clip(centre + [a, 0, b], floor, centre + 6) for a, b in shifts]
-    best = min((minimize(cost, x, method="L-BFGS-B", bounds=bounds) for x in starts), key=lambda r: r.fun)
-    return best.x, np.linalg.pinv(_hessian(cost, best.x), hermitian=True)
+    best = min((minimize(cost, x, jac=True, method="L-BFGS-B", bounds=bounds) for x in starts), key=lambda r: r.fun).x
+    low, high = np.transpose(bounds)
+    for _ in range(POLISHING):
+        free = (best > low) & (best < high)
+        step = np.zeros(best.size)
+        step[free] = np.linalg.solve(_hessian(cost, best)[np.ix_(free, free)], cost(best)[1][free])
+        moved = np.clip(best - step, low, high)
+        if cost(moved)[0] > cost(best)[0] + 1e-9:
+            break
+        best = moved
+    return best, np.linalg.pinv(_hessian(cost, best), hermitian=True)
 
 
-def _hessian(function, x, h=1e-2):
-    n = len(x)
-    unit = np.eye(n) * h
-    value = np.empty((n, n))
-    for i in range(n):
-        for j in range(i, n):
-            a = function(x + unit[i] + unit[j]) - function(x + unit[i] - unit[j])
-            b = function(x - unit[i] + unit[j]) - function(x - unit[i] - unit[j])
-            value[i, j] = value[j, i] = (a - b) / (4 * h * h)
-    w, v = np.linalg.eigh(value)
+def _hessian(function, x, h=1e-4):
+    value = np.stack([function(x + e)[1] - function(x - e)[1] for e in h * np.eye(len(x))]) / (2 * h)
+    w, v = np.linalg.eigh(0.5 * (value + value.T))
     return (v * np.maximum(w, 0.1)) @ v.T
 
 

@@ -30,6 +30,8 @@ ON_SUMMARY = 2 * PER_FIGURE
 """Records whose indicators fit on the summary page."""
 LEFT_OUT = ("predictive", "torque-energy", "amplitude")
 """Figures that stand in the result folder only."""
+UNTIL_CONVERGED = ("trace",)
+"""Figures that the report shows only where the chain has not converged: else its numbers say it."""
 FIRST_ONLY = ("loop", "modules")
 """Figures of which the report shows the first; those of further records stand in the result folder."""
 
@@ -37,7 +39,8 @@ FIRST_ONLY = ("loop", "modules")
 def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``fit`` and lay out its pages."""
     saved = Saved.read(folder)
-    figures = figures_of(saved, _shown)
+    left_out = LEFT_OUT + UNTIL_CONVERGED * bool(saved.indicators["convergence"]["converged"])
+    figures = figures_of(saved, lambda name: _shown(name, left_out))
     level = saved.indicators["level"]
     shown = ["loop"]
     rest = [name for name in figures if name not in shown]
@@ -62,9 +65,9 @@ def chapter(folder: Path) -> Chapter:
     )
 
 
-def _shown(name):
+def _shown(name, left_out):
     kind = name.rstrip("0123456789").rstrip("-")
-    return kind not in LEFT_OUT and (kind not in FIRST_ONLY or name == kind)
+    return kind not in left_out and (kind not in FIRST_ONLY or name == kind)
 
 
 def _outcome(saved):
@@ -131,20 +134,19 @@ def _record_list(records):
 def _details(saved, figures) -> list[Block]:
     level = saved.indicators["level"]
 
-    def pictures(kind):
-        return [Picture(n, caption(n, level)) for n in figures if n == kind or n.startswith(f"{kind}-")]
+    def pictures(kind, floats=False):
+        return [Picture(n, caption(n, level), floats) for n in figures if n == kind or n.startswith(f"{kind}-")]
 
     more = tables.indicators(saved) if len(saved.records) > ON_SUMMARY else []
     parts = (
         ("Indicators of all records", more),
         ("Module decomposition", [*pictures("modules"), *tables.mechanism(saved)]),
         ("Energy and back-drive", [*pictures("energy"), *tables.ranges(saved)]),
-        ("Parameters", parameters(saved)),
+        ("Parameters", [*parameters(saved), *pictures("corner", floats=True)]),
         ("Classic least-squares fit", least_squares(saved)),
-        ("Sampling and noise", [*tables.convergence(saved), *tables.noise(saved), *_reproduction(saved)]),
-        ("", [*pictures("trace"), *pictures("corner")]),
+        ("Sampling and noise", [*tables.convergence(saved), *tables.noise(saved), *_reproduction(saved), *pictures("trace")]),
     )
-    return [b for name, blocks in parts if blocks for b in (*([Heading(name)] if name else []), *blocks)]
+    return [b for name, blocks in parts if blocks for b in (Heading(name), *blocks)]
 
 
 def _reproduction(saved):
@@ -155,6 +157,6 @@ def _reproduction(saved):
     told = (
         f"Seed {attributes['seed']}; {evaluations} evaluations of the marginal posterior density by "
         f"{attributes['inference_library']} {attributes['inference_library_version']}. Software: {attributes['versions']}. "
-        f"Data, SHA-256: {attributes['data_sha256'] or 'not recorded'}."
+        f"Data, SHA-256: {attributes['data_sha256'].replace(',', ', ') or 'not recorded'}."
     )
     return [Note(f"Reproduction: the same data, versions and seed give the same result bit for bit. {told}")]

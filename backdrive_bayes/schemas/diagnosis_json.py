@@ -79,13 +79,13 @@ class BeforeAfter(Struct):
 
 
 class Shrink(Struct):
-    """How far the gap shrinks on held-out data."""
+    """How far the gap shrinks on held-out data; ``closed_fraction`` is null where only properties of the class are named."""
 
     held_out: str
     before_rad: Number
     after_rad: Number
     noise_floor_rad: Number
-    closed_fraction: Interval
+    closed_fraction: Interval | None
     indicators: dict[str, BeforeAfter]
     retuned_rad: Number = None
     records: list[HeldOut] = field(default_factory=list)

@@ -1,11 +1,15 @@
 """The demo calls every verb with all the options that the verb's own command line has."""
 
 from argparse import ArgumentParser
+from pathlib import Path
 
+import pypdf
 import pytest
 
 from backdrive_bayes.commands import accept, check, compare, demo, diagnose, fit, fleet, report
 
+REPORT = Path(__file__).resolve().parents[2] / "reports" / "demo" / "report.pdf"
+PAGES = 16
 VERBS = (check, fit, diagnose, accept, compare, report, fleet)
 
 
@@ -30,3 +34,7 @@ def test_an_option_that_is_left_out_would_be_seen(monkeypatch):
     monkeypatch.setattr(check, "run", lambda args: args.simulated)
     with pytest.raises(AttributeError, match="simulated"):
         demo._call(check, ["unit"], out=None, seed=0)
+
+
+def test_the_committed_report_is_short():
+    assert len(pypdf.PdfReader(REPORT).pages) <= PAGES

@@ -1,30 +1,91 @@
-"""Leaps ahead are told from noise, and a stray leap back does not undo them."""
+"""Teeth that leap ahead are told from noise, from waves, from teeth the other way and from single steps."""
 
 import numpy as np
+import pytest
 
-from backdrive_bayes.engine.jumps import _mixture
+from backdrive_bayes.engine.jumps import SEEN, Teeth, even_series, weigh_teeth, without_wave
+from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
+
+COUNT = 2000
+LEG = np.repeat([-1, 1, 2, 3], COUNT // 4)
 
 
-def leaps(ahead=0, back=0):
-    values = np.random.default_rng(0).standard_normal(2000)
-    values[:ahead] = 12.0
-    values[ahead : ahead + back] = -20.0
-    return values
+def noise(seed=0, memory=0.8):
+    rng, found = np.random.default_rng(seed), np.zeros(COUNT)
+    for t in range(1, COUNT):
+        found[t] = memory * found[t - 1] + np.sqrt(1 - memory**2) * rng.standard_normal()
+    return found
+
+
+def teeth(height, length=20.0, uneven=0.2, seed=1):
+    """A lag that grows with the run and falls to nothing where it has reached a tooth's length, which varies."""
+    rng, found, run, limit = np.random.default_rng(seed), np.empty(COUNT), 0.0, length
+    for t in range(COUNT):
+        run += 1.0
+        if run > limit:
+            run, limit = 0.0, length * (1 + uneven * rng.uniform(-1, 1))
+        found[t] = -height * run / length
+    return found
 
 
 def factor(values):
-    return _mixture(values) - _mixture(-values)
+    return weigh_teeth([Teeth(even_series(values, LEG, 1), 0.002)]).log_factor
 
 
-def test_many_leaps_ahead_speak_and_noise_does_not():
-    assert factor(leaps(ahead=40)) > 100 and abs(factor(leaps())) < 3
+@pytest.mark.parametrize("length", [6.0, 20.0, 70.0])
+def test_teeth_ahead_speak(length):
+    assert factor(noise() + teeth(4.0, length)) > 20
 
 
-def test_a_stray_leap_back_changes_little():
-    assert factor(leaps(ahead=40, back=1)) > 0.9 * factor(leaps(ahead=40)) - 10
+@pytest.mark.parametrize("step", [0.002, 0.002029, 0.002114, 0.0031])
+def test_the_shortest_teeth_are_seen_at_any_step(step):
+    assert weigh_teeth([Teeth(even_series(noise() + teeth(4.0, 4.0), LEG, 1), step)]).log_factor > 20
 
 
-def test_leaps_of_either_sign_are_no_stick_slip():
-    """A planted fault: as many back as ahead."""
-    values = leaps(ahead=20)
-    assert factor(values) > 50 and abs(factor(np.r_[values, -values])) < 1e-6
+def test_noise_alone_speaks_against_them_as_far_as_they_are_seen():
+    assert all(np.log(1.0 - SEEN) <= factor(noise(seed)) < -0.3 for seed in range(4))
+
+
+def test_the_leap_is_measured():
+    found = weigh_teeth([Teeth(even_series(0.3 * noise() + teeth(4.0), LEG, 1), 0.002)])
+    assert found.size_rad == pytest.approx(4.0, rel=0.4)
+
+
+def test_teeth_that_leap_back_are_no_stick_slip():
+    """A planted fault: the angle creeps ahead and leaps back."""
+    assert factor(noise() - teeth(4.0)) < -0.6
+
+
+def test_a_wave_is_no_stick_slip():
+    """A planted fault: a vibration or an encoder's error as large as the noise."""
+    wave = 1.5 * np.sin(2 * np.pi * np.arange(COUNT) / 20.0)
+    assert factor(noise() + wave) < 2
+
+
+def test_single_steps_are_no_stick_slip():
+    """A planted fault: the angle steps ahead three times, by far more than the noise."""
+    steps = 30.0 * np.sum(np.arange(COUNT)[:, None] > np.array([700, 1210, 1790]), axis=1)
+    assert factor(noise() + steps) < 2
+
+
+def test_steep_places_and_short_runs_are_left_out():
+    assert even_series(noise(), np.full(COUNT, -1), 1) is None
+    assert even_series(noise(), LEG, 100) is None
+    assert weigh_teeth([]).log_factor == 0.0
+
+
+def test_no_teeth_is_the_limit_of_low_teeth():
+    series = Series(noise(), np.arange(COUNT) == 0)
+    fitted = fit_noise(series)
+    assert tooth_gain(series, fitted, fitted.memory, 1e-9, 20.0) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_an_encoders_wave_is_taken_off_with_its_harmonics():
+    """A planted fault: an interpolation error whose flanks are unlike is a sawtooth of the angle on every leg."""
+    angle = np.concatenate([np.linspace(-side, side, COUNT // 4) for side in (1, -1, 1, -1)])
+    phase = 2 * np.pi * 12.05 * angle
+    wrong = -3.0 * np.arctan2(0.7 * np.sin(phase), 1 - 0.7 * np.cos(phase))
+    direction = np.repeat([-1.0, 1.0, -1.0, 1.0], COUNT // 4)
+    measured = noise() + wrong
+    assert factor(measured * direction) > 20
+    assert factor(without_wave(measured, angle, LEG, 12.0) * direction) < 2

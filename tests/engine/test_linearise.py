@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.planted import MORE, SCALE, UNITS, planted
+from support.planted import MORE, SCALE, UNITS, joint_mode, planted, smooth_reducer
 
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.design import class_groups, class_priors
@@ -21,7 +21,7 @@ from backdrive_bayes.mechanics.registry import LIBRARY
 
 
 def mode(**options):
-    return linearise(reduce_unit(planted(**options)), library_terms())[0]
+    return joint_mode(reduce_unit(planted(**options)), library_terms())
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +55,12 @@ def single(linear):
 
 
 @pytest.mark.parametrize("offset_nm", [4e-4, -2e-4])
-def test_starts_hold_the_offset_before_any_model(offset_nm):
+def test_starts_hold_the_offset_to_the_torque_noise_and_the_mode_more_closely(offset_nm):
+    """Four tenths of the torque noise of a sample are what the legs tell before any model; the mode is within a fifth."""
     reduced = reduce_unit(planted(offset_nm=offset_nm))
     within = 0.5 * reduced.context.torque_noise
     assert all(s.offset == pytest.approx(offset_nm / SCALE, abs=within) for s in possible_starts(reduced))
+    assert joint_mode(reduced, library_terms()).distortion.offset == pytest.approx(offset_nm / SCALE, abs=2e-4)
 
 
 def test_one_start_holds_the_lag():
@@ -78,7 +80,7 @@ def test_an_offset_that_is_withheld_costs_likelihood(monkeypatch):
     """A planted fault: held at no offset, the model takes a shifted loop for jitter and noise."""
     monkeypatch.setattr(engine, "possible_starts", lambda reduced: [Distortion()])
     reduced = reduce_unit(planted(offset_nm=8e-4))
-    free, held = (linearise(reduced, effects)[0] for effects in (LIBRARY["torque_offset"], ()))
+    free, held = (joint_mode(reduced, effects) for effects in (LIBRARY["torque_offset"], ()))
     assert free.distortion.offset == pytest.approx(8e-3, abs=8e-4) and held.distortion.offset == 0.0
     assert free.solution.log_marginal + free.data.log_volume > held.solution.log_marginal + held.data.log_volume + 50
 
@@ -113,8 +115,8 @@ def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
     monkeypatch.setattr(engine, "REFINEMENTS", 0)
     coarse = mode(engagement=0.05)
     assert coarse.reducer.knots.size <= 10 + HALVINGS < refined.reducer.knots.size
-    added = np.setdiff1d(refined.reducer.knots, coarse.reducer.knots)
-    assert np.median(np.abs(added - 0.05)) < 0.03
+    near, whole = (np.sum(np.abs(m.reducer.knots - 0.05) < 0.03) for m in (refined, coarse)), refined.reducer.knots.size
+    assert np.subtract(*near) >= 0.8 * (whole - coarse.reducer.knots.size)
     assert refined.solution.log_marginal + refined.data.log_volume > coarse.solution.log_marginal + coarse.data.log_volume + 10
 
 
@@ -165,6 +167,17 @@ def test_a_clean_unit_has_one_mode_and_an_offset_adds_those_without_and_with_it_
     trace = np.log(LIBRARY["torque_offset"][0].trace(found[0].reduced.context))
     assert [m.log_scale["torque_offset"] == pytest.approx(trace) for m in found] == [False, True, False]
     assert found[2].log_marginal > found[1].log_marginal + 50
+
+
+def test_friction_that_follows_the_rate_is_found_at_its_own_mode():
+    found = linearise(reduce_unit(planted(known=smooth_reducer(), exponent=0.4)), library_terms())
+    assert [m.distortion.friction_exponent for m in found] == pytest.approx([0.4, 0.0, 0.4], abs=0.05)
+
+
+def test_an_early_angle_is_no_lag_at_any_mode():
+    for found in linearise(reduce_unit(planted(known=smooth_reducer(), lag_s=-0.03)), library_terms()):
+        trace = LIBRARY["sensor_lag"][0].trace(found.reduced.context)
+        assert found.log_scale["sensor_lag"] == pytest.approx(np.log(trace))
 
 
 def test_an_offset_of_a_fifth_of_the_range_is_a_start():

@@ -7,10 +7,12 @@ import pytest
 from scipy.linalg import block_diag, null_space
 from scipy.stats import invgamma, multivariate_normal, multivariate_t
 
+from backdrive_bayes.engine.contrasts import Contrasts
 from backdrive_bayes.engine.marginal import Scales, Whitened, find_scales, whiten
 
 SIZES, WEIGHTS, DOF = (30, 22), 9, 25.0
 GROUP = np.repeat([0, 1, 2], 3)
+FLIP = np.where(np.arange(WEIGHTS) == 1, -1.0, 1.0)
 
 
 def covariance(rng, size):
@@ -182,3 +184,18 @@ def test_what_is_trusted_little_counts_as_so_many_fewer_samples(problem):
     for ours, theirs in ((data.gram, wide.gram), (data.moment, wide.moment), (data.total, wide.total)):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9)
     assert data.samples == pytest.approx(0.1 * SIZES[0] + SIZES[1] - 2) and wide.samples == sum(SIZES) - 2
+
+
+def test_a_weight_of_one_sign_halves_its_prior(problem):
+    """The column and its mirror image share the likelihood of a weight of either sign; the sign that was planted has it all."""
+    data = whiten(*problem, DOF)
+    none = np.zeros((0, GROUP.size))
+    contrasts = Contrasts((), GROUP, data.gram, data.moment, data.total, data.samples, data.noise_dof, none, none)
+    flipped = replace(contrasts, gram=data.gram * np.outer(FLIP, FLIP), moment=data.moment * FLIP)
+    scale = np.repeat([1.0, 0.2, 0.0], 3)
+    both = contrasts.log_marginal(scale)
+    halves = [c.log_marginal(scale, [1]) for c in (contrasts, flipped)]
+    assert both == pytest.approx(data.log_marginal(np.maximum(scale, 1e-12)))
+    assert np.logaddexp(*halves) - np.log(2.0) == pytest.approx(both)
+    sign = np.sign(data.solve(np.maximum(scale, 1e-12)).mean[1])
+    assert max(halves) == pytest.approx(both + np.log(2.0), abs=0.05) and (halves[0] > halves[1]) == (sign > 0)

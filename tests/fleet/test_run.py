@@ -1,5 +1,6 @@
 """Runs: every unit once and the same whatever happens to workers, the scheduler, the disk or the run."""
 
+import asyncio
 import os
 import shutil
 import signal
@@ -31,11 +32,13 @@ if __name__ == "__main__":
 TLS_CLUSTER = """
 import sys
 import distributed
+from backdrive_bayes.fleet import cluster
 if __name__ == "__main__":
     ca, key = sys.argv[1:]
     files = {f"tls_{w}_{what}": p for w in ("scheduler", "worker", "client") for what, p in (("cert", ca), ("key", key))}
     security = distributed.Security(require_encryption=True, tls_ca_file=ca, **files)
-    with distributed.LocalCluster(1, threads_per_worker=1, security=security, dashboard_address="127.0.0.1:0") as local:
+    options = {"security": security, "dashboard_address": "127.0.0.1:0", "loop": cluster.event_loop()}
+    with distributed.LocalCluster(1, threads_per_worker=1, **options) as local:
         print(local.scheduler_address, flush=True)
         sys.stdin.read()
 """
@@ -194,6 +197,26 @@ def test_a_scheduler_that_speaks_tls_is_joined_with_its_files_and_not_without(fl
     assert counts(tally) == {"done": UNITS} and files(out) == undisturbed
 
 
+def test_a_thread_that_starts_late_is_waited_for(monkeypatch):
+    """On a busy machine: dask gives up a thread of its own after ten seconds, on an assertion."""
+    start, real = cluster.event_loop.__wrapped__, asyncio.run
+    monkeypatch.setattr(asyncio, "run", lambda main: (time.sleep(0.3), real(main)))
+    monkeypatch.setattr(cluster, "LOOP_WAIT_S", 0.05)
+    with pytest.raises(BadInput, match="a thread that starts within"):
+        start()
+    monkeypatch.setattr(cluster, "LOOP_WAIT_S", 30)
+    assert start().asyncio_loop.is_running()
+
+
+def test_no_thread_is_left_to_dask(two_workers, monkeypatch):
+    from distributed.utils import LoopRunner
+
+    assert two_workers.loop is two_workers.cluster.loop is cluster.event_loop()
+    monkeypatch.setattr(LoopRunner, "_real_stop", lambda *_: pytest.fail("dask started a loop of its own"))
+    with cluster.joined(two_workers.scheduler.address) as client:
+        assert client.loop is cluster.event_loop()
+
+
 def test_a_scheduler_that_is_not_there_is_said(monkeypatch):
     monkeypatch.setattr(cluster, "WAIT_S", 1)
     for address in ("tcp://127.0.0.1:9", "nonsense", "ftp://x:1"):
@@ -204,7 +227,7 @@ def test_a_scheduler_that_is_not_there_is_said(monkeypatch):
 def test_a_scheduler_without_workers_is_said(monkeypatch):
     monkeypatch.setattr(cluster, "WAIT_S", 1)
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty:
+    with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0", loop=cluster.event_loop()) as empty:
         with pytest.raises(BadInput, match="a scheduler with workers"), cluster.joined(empty.scheduler_address):
             pass
 

@@ -4,8 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.planted import PERIOD_RAD, UNITS, prepared
+from support.planted import LOOPS, PERIOD_RAD, UNITS, VARIANTS, planted, prepared, smooth_reducer
 
+from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.gap import probabilities as gap
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
@@ -48,6 +49,21 @@ def test_what_breaks_a_symmetry_has_evidence_that_a_clean_unit_has_not(name):
     assert there.left[()] > clean.left[()] + 1
 
 
+@pytest.mark.parametrize("name", [n for n in VARIANTS if n != "teeth_back"])
+def test_other_forms_of_an_effect_are_named_with_nothing_beside(name):
+    """Teeth of stick-slip; a wave with few periods and strong harmonics; creep under the square of the load."""
+    weighed = weigh(prepare(VARIANTS[name]()))
+    answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    assert next(iter(answers)) == name and answers[name] > 0.4
+    assert max(weighed.log_factor.values()) < weighed.log_factor[(name,)] + 2
+
+
+def test_teeth_that_leap_back_are_no_stick_slip():
+    """A planted fault: on every leg the angle runs ahead and leaps back."""
+    weighed = weigh(prepare(VARIANTS["teeth_back"]()))
+    assert weighed.log_factor[("stick_slip",)] < 0
+
+
 def test_the_period_of_the_wave_is_found():
     weighed = found("encoder_error")[0]
     period = weighed.linear.reduced.angle_scale_rad / weighed.frequency[("encoder_error",)]
@@ -71,6 +87,21 @@ def test_effects_that_are_not_allowed_are_not_weighed():
     weighed = weigh(prepared("torque_offset"), ("sensor_lag", "thermal_drift"))
     named = {n for h in weighed.log_factor for n in h}
     assert named == {"sensor_lag", "thermal_drift", "unknown"}
+
+
+def test_an_early_angle_is_no_lag():
+    """A planted fault: the torque channel is late. What the name stands for is one way, as strong as a lag would be."""
+    late, early = found("sensor_lag")[0], weigh(prepare(planted(known=smooth_reducer(), lag_s=-0.03)))
+    assert late.log_factor[("sensor_lag",)] > 15 and early.log_factor[("sensor_lag",)] < 1
+    assert early.linears[0].distortion.lag_s < 1e-3
+
+
+def test_one_rate_says_nothing_of_a_law_of_the_rate():
+    """A name that the records cannot tell is as likely as before, not impossible."""
+    one = weigh(prepare(planted(known=smooth_reducer(), loops=LOOPS[1:])))
+    assert one.log_factor[("rate_dependent_friction",)] == 0.0
+    joint = gap.probabilities(one.log_factor, one.left, {})
+    assert joint[("rate_dependent_friction",)] == pytest.approx(joint[()] * np.exp(gap.CALIBRATION.single))
 
 
 def test_weighing_again_gives_the_same_numbers():

@@ -1,13 +1,14 @@
 """Where a gap lies and how far a name closes it on held-out data."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.planted import prepared
 
 from backdrive_bayes.engine.levels import levels
-from backdrive_bayes.gap import next_test, where
+from backdrive_bayes.gap import diagnose, next_test, where
 from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink
 
 
@@ -71,6 +72,16 @@ WRONG = [("asymmetric_stiffness", "torque_offset"), ("thermal_drift", "torque_of
 @pytest.mark.parametrize(("unit", "name"), WRONG)
 def test_a_wrong_name_closes_nothing(unit, name):
     assert closed(unit, name)["median"] < 0.1 and closed(unit, name)["lo"] <= 0.01
+
+
+def test_a_property_is_in_the_class_before_and_after():
+    """Nothing is added, so nothing could close: no fraction is told of it, and none doubts it."""
+    inside, added = (shrunk("asymmetric_stiffness", n) for n in ("second_backlash", "asymmetric_stiffness"))
+    np.testing.assert_allclose(inside.after, inside.before)
+    found = SimpleNamespace(properties=(SimpleNamespace(name="second_backlash"),), rng=np.random.default_rng(0))
+    assert diagnose._Found._closed(found, ("second_backlash",), inside) is None
+    assert diagnose._Found._closed(found, ("asymmetric_stiffness", "second_backlash"), added)["median"] > 0.75
+    assert diagnose._Found._closed(found, (), inside)["hi"] == 0.0
 
 
 def test_held_out_records_are_every_record_in_turn():

@@ -112,6 +112,17 @@ def test_a_name_that_closes_nothing_is_doubted(tmp_path):
         assert title in pages[0] and ("predicts nothing of what it is named for" in pages[0]) == (hi < 0)
 
 
+def test_a_property_of_the_class_closes_nothing_and_is_not_judged_by_it(tmp_path):
+    result, answer = write_diagnosis(tmp_path, 1), {"effects": ["second_backlash"], "credible_set_90": ["second_backlash"]}
+    records = [r | {"closed_fraction": None} for r in result["shrink"]["records"]]
+    for closed, told in ((None, False), (result["shrink"]["closed_fraction"], True)):
+        write_diagnosis(tmp_path, 1, shrink=result["shrink"] | {"closed_fraction": closed, "records": records}, answer=answer)
+        pages, _ = pages_of(tmp_path)
+        assert "CAUSE NAMED" in pages[0] and ("part of the model class" in pages[0]) != told
+        assert ("Added to the model" in pages[0]) == told
+        assert any("How far it shrinks" in p or "What it changes" in p for p in pages) == told
+
+
 @pytest.mark.parametrize(("unlisted", "told"), [(0.98, True), (0.06, False)])
 def test_what_acts_beside_a_named_module_is_told(tmp_path, unlisted, told):
     which = [{"effect": "geometric", "probability": 0.96}, {"effect": "unknown", "probability": 0.04}]

@@ -10,7 +10,8 @@ from support_results import GROUP_ATTRIBUTES, indicators, write_result
 
 from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.number_text import interval_text, significant
-from backdrive_bayes.report import report
+from backdrive_bayes.report import fit_section, report
+from backdrive_bayes.report.blocks import Picture
 from backdrive_bayes.report.text import cut, free, printable, typeset
 
 HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref //"
@@ -144,6 +145,13 @@ def test_not_converged_is_inconclusive_with_advice(tmp_path):
     page = text_of(pypdf.PdfReader(report.write_report([tmp_path], tmp_path / "out" / "r.pdf")), 0)
     assert "INCONCLUSIVE" in page and "give it more time" in page and "Do not use" in page
     assert "provisional – not to be used" in page and "Signature" not in page
+
+
+@pytest.mark.parametrize("converged", [True, False])
+def test_traces_are_shown_until_the_chain_has_converged(tmp_path, converged):
+    write_result(tmp_path, records=1, convergence=indicators(1)["convergence"] | {"converged": converged, "advice": "more"})
+    shown = [block.name for block in fit_section.chapter(tmp_path).details if isinstance(block, Picture)]
+    assert "corner" in shown and ("trace" in shown) != converged
 
 
 def test_what_the_check_found_and_was_overruled_stands_on_the_first_page(tmp_path):

@@ -1,12 +1,15 @@
 """Units of the class with planted faults, small enough to be analysed within a second or two."""
 
+from copy import copy
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
 from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, angle_noise, physical_reducer, ramp
+from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.records.record import Record, Unit
 
@@ -34,13 +37,16 @@ def smooth_reducer(extra=None) -> KnownReducer:
     return replace(known, weights=weights)
 
 
-def planted(seed=0, *, known=None, offset_nm=0.0, lag_s=0.0, jitter=None, loops=LOOPS, noise=NOISE, **options) -> Unit:
-    """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque."""
+def planted(
+    seed=0, *, known=None, offset_nm=0.0, lag_s=0.0, exponent=0.0, jitter=None, loops=LOOPS, noise=NOISE, **options
+) -> Unit:
+    """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque, friction
+    follows the rate over 0.05 N·m/s with ``exponent``."""
     known = known or physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | options))
     rng, records = np.random.default_rng(seed + 20), []
     for amplitude, rate in loops:
         time, torque = ramp(amplitude, rate, HERTZ)
-        angle = known.angle_rad(time, torque)
+        angle = _firmer(known, (rate / 0.05) ** exponent).angle_rad(time, torque)
         if jitter:
             angle = _jittered(torque, angle, *jitter, rng)
         angle = np.interp(time - lag_s, time, angle) + angle_noise(time.size, 1 / HERTZ, noise, rng)
@@ -56,6 +62,30 @@ def changed(unit: Unit, change) -> Unit:
 
 def _smooth(extra=None, **options):
     return planted(known=smooth_reducer(extra), **options)
+
+
+def _distorted(record, turns):
+    """Interpolation error of quadrature signals with an offset and flattened tops, about ``turns`` periods in the angles."""
+    phase = 2 * np.pi * turns * record.angle_rad / np.ptp(record.angle_rad)
+    sine, cosine = np.sin(phase) + 0.3 - 0.05 * np.sin(3 * phase), np.cos(phase) + 0.05 * np.cos(3 * phase)
+    return 4e-4 * np.angle((cosine + 1j * sine) * np.exp(-1j * phase)) / 0.3
+
+
+def _teeth(record, height=6e-4, length_nm=4e-3):
+    """Stick-slip: on every leg the angle hangs back with the torque run since the last leap, and leaps ahead."""
+    run = np.cumsum(np.abs(np.diff(record.torque_nm, prepend=record.torque_nm[0])))
+    steps = np.random.default_rng(3).uniform(0.8, 1.2, int(run[-1] / length_nm) + 9) * length_nm
+    leaps = np.cumsum(steps)
+    at = np.searchsorted(leaps, run)
+    since = run - np.r_[0.0, leaps][at]
+    return -height * np.sign(np.gradient(np.convolve(record.torque_nm, np.ones(9) / 9, "same"))) * since / length_nm
+
+
+def _delayed_square(record, time_s=3.0):
+    """Creep under the square of the load: one Kelvin-Voigt element at rest at the start."""
+    share = 1.0 - np.exp(-1.0 / (HERTZ * time_s))
+    load = (record.torque_nm / 0.1) ** 2 * np.sign(record.torque_nm)
+    return 2e-3 * lfilter([share], [1.0, share - 1.0], load)
 
 
 UNITS = {
@@ -80,6 +110,21 @@ def prepared(name):
     return prepare(UNITS[name]())
 
 
+def joint_mode(reduced, effects):
+    """The first of the modes of ``linearise``; the others, of each bending effect alone, are not searched."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(engine, "MOST_BENT", -1)
+        return engine.linearise(reduced, effects)[0]
+
+
+def _firmer(known, factor):
+    """The reducer with other thresholds of friction."""
+    parts = (replace(p, cells=p.cells.wider(factor)) if p.name == "friction" else p for p in known.reducer.parts)
+    reducer = copy(known.reducer)
+    object.__setattr__(reducer, "parts", tuple(parts))
+    return replace(known, reducer=reducer)
+
+
 def _jittered(torque, angle, sd, length, rng):
     """Every leg read at torques that wander by ``sd`` over ``length``."""
     leg = np.cumsum(np.r_[0, np.diff(np.sign(np.diff(torque))) != 0, 0])
@@ -91,3 +136,12 @@ def _jittered(torque, angle, sd, length, rng):
         wander = lfilter([np.sqrt(1 - phi**2)], [1, -phi], drive, zi=[phi * rng.standard_normal()])[0]
         found[own] = np.interp(sign * (torque[own] + sd * SCALE * wander), sign * torque[own], angle[own])
     return found
+
+
+VARIANTS = {
+    "stick_slip": lambda: changed(_smooth(), lambda r, i: _teeth(r)),
+    "teeth_back": lambda: changed(_smooth(), lambda r, i: _teeth(r, -6e-4)),
+    "encoder_error": lambda: changed(_smooth(), lambda r, i: _distorted(r, 3.6)),
+    "viscoelastic_creep": lambda: changed(_smooth(loops=MORE), lambda r, i: _delayed_square(r)),
+}
+"""Effects in another form than in UNITS."""

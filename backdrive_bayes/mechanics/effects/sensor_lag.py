@@ -4,7 +4,9 @@ from backdrive_bayes.mechanics.effect import SpreadEffect, TangentEffect
 
 
 class SensorLag(TangentEffect):
-    """The loop's width grows with rate times slope."""
+    """The loop's width grows with rate times slope: late is one way, an angle ahead of the torque is no lag."""
+
+    one_way = True
 
     def trace(self, context):
         """The torque moves by half of its noise."""

@@ -2,6 +2,7 @@
 
 import numba
 import numpy as np
+from scipy.linalg import block_diag
 
 from backdrive_bayes.mechanics.effect import PathEffect
 from backdrive_bayes.mechanics.history import played
@@ -12,7 +13,8 @@ FRICTION = 0.04
 
 
 class ViscoelasticCreep(PathEffect):
-    """Kelvin-Voigt elements over a range of time constants, driven by the torque and by the torque behind friction."""
+    """Kelvin-Voigt elements over a range of time constants, driven by the torque, by the torque behind friction and, as creep
+    that grows faster than the load (Schapery, Polym. Eng. Sci. 9, 1969), by its square."""
 
     def trace(self, context):
         """A third of the angle noise."""
@@ -32,7 +34,8 @@ class ViscoelasticCreep(PathEffect):
         span = np.maximum(history.t1 - history.t0, 1e-12)
         held = played(history.z0[0], history.z1, FRICTION)
         begin, end = [], []
-        for (z0, z1), chosen in (((history.z0, history.z1), times), ((held[:-1], held[1:]), times[::2])):
+        bent = tuple(z * np.abs(z) for z in (history.z0, history.z1))
+        for (z0, z1), chosen in (((history.z0, history.z1), times), ((held[:-1], held[1:]), times[::2]), (bent, times[::2])):
             for time in chosen:
                 a, b = _delayed(z0, z1, span, time)
                 begin.append(a - z0)
@@ -43,11 +46,8 @@ class ViscoelasticCreep(PathEffect):
 
 def _mixing(log_times):
     near = np.exp(-np.abs(log_times[:, None] - log_times) / 1.5)
-    count, half = log_times.size, log_times[::2].size
-    mixing = np.zeros((count + half, count + half))
-    mixing[:count, :count] = np.linalg.cholesky(near)
-    mixing[count:, count:] = np.linalg.cholesky(0.5 * near[::2, ::2])
-    return mixing
+    fewer = np.linalg.cholesky(0.5 * near[::2, ::2])
+    return block_diag(np.linalg.cholesky(near), fewer, fewer)
 
 
 @numba.njit(cache=True, nogil=True)
