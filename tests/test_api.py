@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from support.decided import evidence, write_evidence
 from support.made_posterior import made_fit
+from support.planted import planted, smooth_reducer
 
 from conftest import ramps, write_csv  # isort: skip
 
@@ -31,11 +33,7 @@ def test_results_show_themselves_and_escape_what_others_wrote(tmp_path):
 
 
 def test_a_diagnosis_shows_its_answer_and_is_evidence_of_its_model(tmp_path):
-    from backdrive_bayes.bench.plan import make_plan
-    from backdrive_bayes.bench.unit import draw_unit
-
-    plan = make_plan(rates=(0.4, 2.0), amplitudes=(1.0,), cycles=1, sampling_hz=200.0)
-    unit = draw_unit(np.random.default_rng(5), {"torque_offset": 1.0}, plan=plan, name="<offset>").unit
+    unit = replace(planted(known=smooth_reducer(), offset_nm=8e-4), name="<offset>")
     found = backdrive_bayes.diagnose(unit)
     assert found.effects == ["torque_offset"] and found.probabilities["torque_offset"] > 0.5
     assert sum(found.probabilities.values()) == pytest.approx(1)

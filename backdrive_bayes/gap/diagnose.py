@@ -123,7 +123,7 @@ class _Found:
         gap = where.estimate_gap(self.linear, self.rng)
         # A process of each leg's own fits what is held out by itself: something unknown closes nothing.
         before, after = self._fitted(()), self._fitted(tuple(e for e in effects if e != "unknown"))
-        shrunk = shrink(before, after, gap.weight)
+        shrunk = shrink(before, after, gap.weight, self.rng)
         closed = self._closed(effects, shrunk)
         named = effects
         if self._hollow(effects, closed):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import solve_triangular
 
 from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.linear import Linear
@@ -53,6 +53,7 @@ class Shrink:
     ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``,
     ``control`` and ``floor``
     are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the control, and noise.
+    ``error`` (1 + resamples, pieces) is what a right model's prediction from the other folds may add to the noise, none first.
     """
 
     names: tuple[str, ...]
@@ -62,6 +63,7 @@ class Shrink:
     after: np.ndarray
     control: np.ndarray
     floor: np.ndarray
+    error: np.ndarray
 
     def mean_square(self, part: str, fold: int | None = None) -> float:
         """Mean square [rad²] of one part in one fold, or over all of them."""
@@ -69,7 +71,8 @@ class Shrink:
         return float(getattr(self, part)[own].sum() / max(self.share[own].sum(), 1e-300))
 
     def closed(self, part: str, rng, level: float, fold: int | None = None) -> dict:
-        """Closed fraction of ``after`` or ``control`` with its central interval by a Bayesian bootstrap over folds and pieces.
+        """Closed fraction of ``after`` or ``control`` with its central interval by a Bayesian bootstrap over folds and pieces, in
+        which a right model's error of prediction is drawn too.
 
         Source: Rubin, Annals of Statistics 9, 1981. Of fewer than ``FEWEST_PIECES`` pieces there is none: both ends
         are the value.
@@ -77,7 +80,9 @@ class Shrink:
         own = np.full(self.fold.size, True) if fold is None else self.fold == fold
         weight = resampled(self.fold[own], rng)
         share = weight @ self.share[own]
-        fraction = closed_fraction(*(weight @ getattr(self, name)[own] / share for name in ("before", part, "floor")))
+        before, left, floor = (weight @ getattr(self, name)[own] / share for name in ("before", part, "floor"))
+        floor = floor + np.sum(weight * self.error[:, own], axis=1) / share
+        fraction = closed_fraction(before, left, floor)
         return about_first(fraction, level, weight.shape[1])
 
 
@@ -99,7 +104,7 @@ def about_first(values, level: float, pieces: int) -> dict:
     return {"median": middle, "lo": min(float(lo), middle), "hi": max(float(hi), middle)}
 
 
-def shrink(before: Fitted, after: Fitted, weight) -> Shrink:
+def shrink(before: Fitted, after: Fitted, weight, rng) -> Shrink:
     """Predict every fold from the others; ``weight`` holds the torque that each block spans, by record."""
     linear = after.linear
     folds = _folds(linear)
@@ -108,18 +113,21 @@ def shrink(before: Fitted, after: Fitted, weight) -> Shrink:
     leg = np.concatenate([b.leg for b in linear.reduced.blocks])
     span, scale = np.concatenate(weight), linear.reduced.angle_scale_rad
     variance = np.concatenate([np.diag(c) for c in linear.covariances]) * scale**2
-    columns = []
+    columns, errors = [], []
     for number, own in enumerate(folds.values()):
         share = span[own] / span[own].sum()
-        residuals = [_held_out(f, own, record) * scale for f in (before, after)]
-        residuals.append(residuals[0] - _control(before, own, record) * scale)
+        (without, _), (with_effect, wide) = (_held_out(f, own, record) for f in (before, after))
+        residuals = [r * scale for r in (without, with_effect, without - _control(before, own, record))]
+        error = (wide - share @ wide) @ rng.standard_normal((wide.shape[1], RESAMPLED)) * scale
         place = np.floor(2 * torque[own] / np.abs(torque[own]).max()).astype(int)
         piece = np.unique(np.stack([leg[own], place]), axis=1, return_inverse=True)[1].ravel()
         parts = (share, *(share * (r - r @ share) ** 2 for r in residuals), share * variance[own])
         sums = np.array([np.bincount(piece, p) for p in parts])
         columns.append(np.concatenate([np.full((1, sums.shape[1]), number), sums]))
+        squares = np.array([np.bincount(piece, share * e**2) for e in error.T])
+        errors.append(np.concatenate([np.zeros((1, sums.shape[1])), squares]))
     fold, *rest = np.concatenate(columns, axis=1)
-    return Shrink(tuple(folds), fold, *rest)
+    return Shrink(tuple(folds), fold, *rest, np.concatenate(errors, axis=1))
 
 
 def _folds(linear):
@@ -135,20 +143,23 @@ def _folds(linear):
     return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in settled} if settled.size > 1 else {"all": np.arange(legs.size)}
 
 
-def _held_out(fitted: Fitted, own, record) -> np.ndarray:
-    """Residual (own blocks,) of what the rest predicts, what belongs to the held-out record alone fitted to it."""
+def _held_out(fitted: Fitted, own, record) -> tuple[np.ndarray, np.ndarray]:
+    """Residual (own blocks,) of what the rest predicts, what belongs to the held-out record alone fitted to it, and a root of
+    that prediction's covariance (own blocks, weights)."""
     linear, design = fitted.linear, fitted.linear.design
-    columns, angle = np.vstack(design.records()), np.concatenate(linear.angles)
+    columns, angle = np.vstack(design.records()), np.concatenate(linear.angles)[:, None]
     rest = np.setdiff1d(np.arange(record.size), own)
     gone = np.setdiff1d(record[own], record[rest])
-    weights = np.zeros(columns.shape[1])
+    alone = _alone(design, int(gone[0])) if gone.size else np.full(columns.shape[1], False)
+    left, used = angle[own], ~alone
     if rest.size:
-        weights = _ridge(linear, columns, angle, rest, record, fitted.scale, np.ones(columns.shape[1], bool))
+        weights, root = _ridge(linear, columns, angle, rest, record, fitted.scale, used)
+        left = np.column_stack([left - columns[own][:, used] @ weights, columns[own][:, used] @ root])
     if gone.size:
-        alone = _alone(design, int(gone[0]))
-        left = angle - columns[:, ~alone] @ weights[~alone]
-        weights[alone] = _ridge(linear, columns, left, own, record, fitted.scale, alone)[alone]
-    return angle[own] - columns[own] @ weights
+        spread = np.zeros((record.size, left.shape[1]))
+        spread[own] = left
+        left = left - columns[own][:, alone] @ _ridge(linear, columns, spread, own, record, fitted.scale, alone)[0]
+    return left[:, 0], left[:, 1:]
 
 
 def _alone(design: Design, record: int) -> np.ndarray:
@@ -162,27 +173,27 @@ def _alone(design: Design, record: int) -> np.ndarray:
     return np.concatenate(found)
 
 
-def _ridge(linear, columns, angle, rows, record, scale, used) -> np.ndarray:
-    """Posterior mean of the ``used`` weights given some rows, offsets by record integrated."""
-    gram, moment = np.zeros((used.sum(), used.sum())), np.zeros(used.sum())
+def _ridge(linear, columns, targets, rows, record, scale, used) -> tuple[np.ndarray, np.ndarray]:
+    """Posterior means (used, targets) of the ``used`` weights given some rows of ``targets`` (blocks, targets), offsets by
+    record integrated, and a root of their covariance (used, used)."""
+    size = int(used.sum())
+    gram, moment = np.zeros((size, size)), np.zeros((size, targets.shape[1]))
     rows = rows[np.concatenate(linear.reduced.trust)[rows] == 1.0]
     start = np.searchsorted(record, np.arange(record.max() + 1))
     for r in np.unique(record[rows]):
         at = rows[record[rows] == r]
         covariance = linear.covariances[r][np.ix_(at - start[r], at - start[r])]
-        factor = cho_factor(covariance, lower=True, check_finite=False)
-        both = np.column_stack([columns[np.ix_(at, np.flatnonzero(used))], angle[at], np.ones(at.size)])
-        solved = cho_solve(factor, both, check_finite=False)
-        inner = both.T @ solved
-        inner = inner - np.outer(inner[:, -1], inner[-1]) / inner[-1, -1]
-        gram += inner[:-2, :-2]
-        moment += inner[:-2, -2]
+        lower = np.linalg.cholesky(covariance)
+        both = np.column_stack([columns[np.ix_(at, np.flatnonzero(used))], targets[at], np.ones(at.size)])
+        white = solve_triangular(lower, both, lower=True, check_finite=False)
+        one = white[:, -1] / np.linalg.norm(white[:, -1])
+        white = white[:, :-1] - np.outer(one, one @ white[:, :-1])
+        gram += white[:, :size].T @ white[:, :size]
+        moment += white[:, :size].T @ white[:, size:]
     s = scale[used]
-    inner = gram * np.outer(s, s)
-    inner[np.diag_indices_from(inner)] += 1.0
-    weights = np.zeros(used.size)
-    weights[used] = s * cho_solve(cho_factor(inner, lower=True, check_finite=False), s * moment, check_finite=False)
-    return weights
+    lower = np.linalg.cholesky(gram * np.outer(s, s) + np.eye(size))
+    root = s[:, None] * solve_triangular(lower, np.eye(size), lower=True, check_finite=False).T
+    return root @ (root.T @ moment), root
 
 
 def _control(fitted, own, record) -> np.ndarray:

@@ -72,11 +72,12 @@ class Split:
     @cached_property
     def held_out(self) -> dict[str, Shrink]:
         """Held-out squares by stage, each in the place of ``after`` with the simulator as it is in that of ``before``."""
-        tuned = shrink(*self.fits, self.weight)
+        rng = np.random.default_rng([self.seed, 12])
+        tuned = shrink(*self.fits, self.weight, rng)
         group = min(self.linear.design.groups, key=lambda g: g.width)
         alone = replace(self.linear, angles=tuple(self.gap), design=Design((group,)))
         nothing = Fitted((), alone, np.zeros(group.width), np.zeros(group.width))
-        bare = shrink(nothing, nothing, self.weight).before
+        bare = shrink(nothing, nothing, self.weight, rng).before
         after = {"simulated": bare, "retuned": tuned.before, "explained": tuned.after}
         return {stage: replace(tuned, before=bare, after=values) for stage, values in after.items()}
 
@@ -101,8 +102,10 @@ class Split:
         tuned, both = self.held_out["retuned"], self.held_out["explained"]
         own = np.full(both.fold.size, True) if fold is None else both.fold == fold
         weight = resampled(both.fold[own], np.random.default_rng([self.seed, 10]))
-        parts = (both.before, tuned.after, both.after, both.floor)
-        return [weight @ p[own] / (weight @ both.share[own]) for p in parts], int(own.sum())
+        share = weight @ both.share[own]
+        parts = [weight @ p[own] / share for p in (both.before, tuned.after, both.after, both.floor)]
+        parts[-1] = parts[-1] + np.sum(weight * both.error[:, own], axis=1) / share
+        return parts, int(own.sum())
 
     def residuals(self) -> dict[str, list[np.ndarray]]:
         """What each stage, fitted to all records, leaves at the blocks of each record, in shares of the angle scale."""

@@ -1,13 +1,16 @@
 """Where a gap lies and how far a name closes it on held-out data."""
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.planted import prepared
+from support.planted import joint_mode, planted, prepared, smooth_reducer
 
+from backdrive_bayes.engine.infer import library_terms
 from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.gap import diagnose, next_test, where
 from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink
 
@@ -21,7 +24,7 @@ def gap_of(name):
 def shrunk(unit, name):
     linear, gap = gap_of(unit)
     before, after = (fit_hypothesis(linear, h, levels(linear, h)) for h in ((), (name,)))
-    return shrink(before, after, gap.weight)
+    return shrink(before, after, gap.weight, np.random.default_rng(1))
 
 
 def closed(unit, name):
@@ -71,7 +74,20 @@ WRONG = [("asymmetric_stiffness", "torque_offset"), ("thermal_drift", "torque_of
 
 @pytest.mark.parametrize(("unit", "name"), WRONG)
 def test_a_wrong_name_closes_nothing(unit, name):
-    assert closed(unit, name)["median"] < 0.1 and closed(unit, name)["lo"] <= 0.01
+    found = closed(unit, name)
+    assert found["median"] < 0.1 and found["lo"] <= 0.01 and found["hi"] < diagnose.LEAST_CLOSED
+
+
+def test_a_right_name_keeps_its_interval_above_half_where_other_records_tell_little():
+    """One settled loop at each of two rates: what the other record foretells is wide, whatever the name."""
+    for seed in range(3):
+        unit = planted(seed, known=smooth_reducer(), offset_nm=8e-4)
+        linear = joint_mode(reduce_unit(unit), library_terms())
+        before, after = (fit_hypothesis(linear, h, levels(linear, h)) for h in ((), ("torque_offset",)))
+        weight = where.estimate_gap(linear, np.random.default_rng(0)).weight
+        held = shrink(before, after, weight, np.random.default_rng(1))
+        found, none = (s.closed("after", np.random.default_rng(0), 0.9) for s in (held, replace(held, error=0.0 * held.error)))
+        assert found["hi"] > 0.9 and found["hi"] >= none["hi"] and found["median"] == none["median"]
 
 
 def test_a_property_is_in_the_class_before_and_after():
