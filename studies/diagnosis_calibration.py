@@ -20,10 +20,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from backdrive_bayes.engine.infer import prepare
-from backdrive_bayes.gap.hypotheses import weigh
+from backdrive_bayes.gap.examine import examine, given_to_unknown
 from backdrive_bayes.gap.probabilities import CALIBRATION, Calibration, credible_set, labels, probabilities
-from backdrive_bayes.gap.properties import find_properties
 from backdrive_bayes.records.unit_folder import read_unit
 
 HOME = Path(__file__).parents[1] / "reports" / "diagnosis-calibration"
@@ -45,15 +43,16 @@ POSITIVE = ("cool", "warm", "spread")
 
 def weigh_unit(folder: Path, truth: dict) -> dict:
     """What a diagnosis rests on for one unit, ready for JSON, with the answer that is right."""
-    weighed = weigh(prepare(read_unit(folder)))
-    found = find_properties(weighed, np.random.default_rng(0))
+    found = examine(read_unit(folder))
     return {
         "answer": sorted({"unknown" if e.startswith("x_") else e for e in truth["effects"]}),
         "effects": truth["effects"],
         "severity": truth["size"],
-        "log_factor": {"+".join(h): round(v, 2) for h, v in weighed.log_factor.items()},
-        "left": {"+".join(h): round(v, 3) for h, v in weighed.left.items()},
-        "properties": {p.name: round(p.probability, 4) for p in found},
+        "log_factor": {"+".join(h): round(v, 2) for h, v in found.weighed.log_factor.items()},
+        "left": {"+".join(h): round(v, 3) for h, v in found.weighed.left.items()},
+        "properties": {p.name: round(p.probability, 4) for p in found.properties},
+        "named": "+".join(found.named) or "none",
+        "doubted": found.doubted,
     }
 
 
@@ -91,7 +90,9 @@ def answers(row: dict, calibration: Calibration) -> dict[str, float]:
     def tuples(table):
         return {tuple(k.split("+")) if k else (): v for k, v in table.items()}
 
-    return labels(probabilities(tuples(row["log_factor"]), tuples(row["left"]), row["properties"], calibration))
+    found = labels(probabilities(tuples(row["log_factor"]), tuples(row["left"]), row["properties"], calibration))
+    likeliest = next(iter(found))
+    return given_to_unknown(found, likeliest) if row.get("doubted") and row["named"] == likeliest else found
 
 
 def right(row: dict) -> str:

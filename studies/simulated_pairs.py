@@ -26,7 +26,8 @@ from scipy.stats import binom
 from simulated_truth import draw_reality, draw_simulator
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.gap.diagnose import LEVEL, diagnose
+from backdrive_bayes.gap.diagnose import diagnose
+from backdrive_bayes.gap.examine import LEVEL
 from backdrive_bayes.gap.shrink import SMALLEST_GAP, closed_fraction
 from backdrive_bayes.gap.simulated import compared
 from backdrive_bayes.gap.simulator import read_simulator

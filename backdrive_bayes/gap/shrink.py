@@ -124,10 +124,10 @@ def shrink(before: Fitted, after: Fitted, weight, rng) -> Shrink:
         parts = (share, *(share * (r - r @ share) ** 2 for r in residuals), share * variance[own])
         sums = np.array([np.bincount(piece, p) for p in parts])
         columns.append(np.concatenate([np.full((1, sums.shape[1]), number), sums]))
-        squares = np.array([np.bincount(piece, share * e**2) for e in error.T])
-        errors.append(np.concatenate([np.zeros((1, sums.shape[1])), squares]))
-    fold, *rest = np.concatenate(columns, axis=1)
-    return Shrink(tuple(folds), fold, *rest, np.concatenate(errors, axis=1))
+        drawn = np.array([np.bincount(piece, share * e**2) for e in error.T])
+        errors.append(np.concatenate([np.zeros((1, sums.shape[1])), drawn]))
+    fold, share, without, added, control, floor = np.concatenate(columns, axis=1)
+    return Shrink(tuple(folds), fold, share, without, added, control, floor, np.concatenate(errors, axis=1))
 
 
 def _folds(linear):

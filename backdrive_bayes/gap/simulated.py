@@ -11,7 +11,8 @@ from threadpoolctl import threadpool_limits
 from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities, where
-from backdrive_bayes.gap.diagnose import LEVEL, SHOWN, Diagnosis, diagnose
+from backdrive_bayes.gap.diagnose import SHOWN, Diagnosis, diagnose
+from backdrive_bayes.gap.examine import LEVEL
 from backdrive_bayes.gap.parameters import interval
 from backdrive_bayes.gap.simulator import Simulator, effects_of, read_simulator, require_reach
 from backdrive_bayes.gap.split import PARTS, STAGES, Split

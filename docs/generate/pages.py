@@ -18,7 +18,7 @@ import numpy as np
 import backdrive_bayes.schemas
 from backdrive_bayes.commands.main import VERBS, main
 from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, reduced, sample
-from backdrive_bayes.gap import diagnose, probabilities, properties, shrink, simulator
+from backdrive_bayes.gap import examine, probabilities, properties, shrink, simulator
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import reducer
 from backdrive_bayes.mechanics.registry import LIBRARY
@@ -30,7 +30,7 @@ NUMBERS = {
     "max_rhat": f"{diagnostics.MAX_RHAT:g}",
     "min_ess": f"{diagnostics.MIN_ESS:g}",
     "ensembles": str(sample.ENSEMBLES),
-    "least_closed": f"{100 * diagnose.LEAST_CLOSED:g} %",
+    "least_closed": f"{100 * examine.LEAST_CLOSED:g} %",
     "usual": f"{properties.USUAL:g}",
     "large": f"{properties.LARGE:g}",
     "own_share": f"{properties.OWN[0]:g}",

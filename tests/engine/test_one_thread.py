@@ -45,7 +45,7 @@ class Reached(Exception):
         (acceptance, "weigh", lambda: acceptance.assess([evidence()], None)),
         (comparison, "unique_names", lambda: comparison.compare([evidence(), evidence()])),
         (averaged, "weighed_unit", lambda: averaged.fit_posterior(None)),
-        (diagnose, "_diagnose", lambda: diagnose.diagnose(None)),
+        (diagnose, "examine", lambda: diagnose.diagnose(None)),
         (pool, "_comparable", lambda: pool.pool_batch("a", [])),
     ],
     ids=lambda v: getattr(v, "__name__", "") if not isinstance(v, str) else v,

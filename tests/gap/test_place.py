@@ -11,7 +11,7 @@ from support.planted import joint_mode, planted, prepared, smooth_reducer
 from backdrive_bayes.engine.infer import library_terms
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.reduced import reduce_unit
-from backdrive_bayes.gap import diagnose, next_test, where
+from backdrive_bayes.gap import examine, next_test, where
 from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink
 
 
@@ -75,7 +75,7 @@ WRONG = [("asymmetric_stiffness", "torque_offset"), ("thermal_drift", "torque_of
 @pytest.mark.parametrize(("unit", "name"), WRONG)
 def test_a_wrong_name_closes_nothing(unit, name):
     found = closed(unit, name)
-    assert found["median"] < 0.1 and found["lo"] <= 0.01 and found["hi"] < diagnose.LEAST_CLOSED
+    assert found["median"] < 0.1 and found["lo"] <= 0.01 and found["hi"] < examine.LEAST_CLOSED
 
 
 def test_a_right_name_keeps_its_interval_above_half_where_other_records_tell_little():
@@ -94,10 +94,14 @@ def test_a_property_is_in_the_class_before_and_after():
     """Nothing is added, so nothing could close: no fraction is told of it, and none doubts it."""
     inside, added = (shrunk("asymmetric_stiffness", n) for n in ("second_backlash", "asymmetric_stiffness"))
     np.testing.assert_allclose(inside.after, inside.before)
-    found = SimpleNamespace(properties=(SimpleNamespace(name="second_backlash"),), rng=np.random.default_rng(0))
-    assert diagnose._Found._closed(found, ("second_backlash",), inside) is None
-    assert diagnose._Found._closed(found, ("asymmetric_stiffness", "second_backlash"), added)["median"] > 0.75
-    assert diagnose._Found._closed(found, (), inside)["hi"] == 0.0
+    def of(named, held_out):
+        inside_class, rng = (SimpleNamespace(name="second_backlash"),), np.random.default_rng(0)
+        found = SimpleNamespace(named=named, held_out=held_out, properties=inside_class, rng=rng)
+        return examine.Found.closed_of(found)
+
+    assert of(("second_backlash",), inside) is None
+    assert of(("asymmetric_stiffness", "second_backlash"), added)["median"] > 0.75
+    assert of((), inside)["hi"] == 0.0
 
 
 def test_held_out_records_are_every_record_in_turn():

@@ -1,0 +1,168 @@
+"""What a diagnosis rests on: effects weighed, properties of the operator, and how far the likeliest name closes the gap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import expit
+
+from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.one_thread import one_thread
+from backdrive_bayes.gap import probabilities, where
+from backdrive_bayes.gap.averaged import weighed_unit, with_columns
+from backdrive_bayes.gap.hypotheses import STICK_SLIP, Weighed
+from backdrive_bayes.gap.properties import Property, find_properties
+from backdrive_bayes.gap.shrink import Fitted, Shrink, fit_hypothesis, shrink
+from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.records.record import Unit
+
+LEVEL = 0.9
+LEAST_CLOSED = 0.5
+"""A name that closes less of the gap than this on held-out data, with all of its interval below, is unknown."""
+MODULE_ODDS = 3.0
+"""Log odds of a module that every reducer has and the baseline was asked to do without."""
+
+
+@one_thread()
+def examine(unit: Unit, *, baseline=BASELINE, seed=0, allowed=None, k=0.03, progress=lambda text: None) -> Found:
+    """What a diagnosis rests on, before the chosen model is sampled."""
+    rng, baseline = np.random.default_rng(seed), tuple(baseline)
+    weighed = weighed_unit(unit, BASELINE, allowed, progress)
+    withheld = _withheld(weighed.linear, baseline)
+    properties = tuple(p for p in find_properties(weighed, rng) if allowed is None or p.name in allowed)
+    joint = probabilities.probabilities(weighed.log_factor, weighed.left, {p.name: p.probability for p in properties})
+    joint = _with_modules(joint, withheld)
+    progress("where it lies and how far it shrinks")
+    return Found(unit, weighed, properties, joint, withheld, rng, k, baseline, allowed, seed)
+
+
+def _withheld(linear: Linear, baseline) -> dict[str, float]:
+    """Probability of each module that the baseline lacks, from the log marginal likelihood with and without it."""
+    found = {}
+    for module in BASELINE:
+        if module not in baseline:
+            names = {p.name for p in linear.reducer.parts if p.module == module} | (
+                {"floating"} if module == "geometric" else {"initial"}
+            )
+            scale = np.exp([linear.log_scale[n] for n in linear.design.names])
+            without = np.where(np.isin(linear.design.names, list(names)), 1e-6, scale)
+            gain = linear.data.log_marginal(scale[linear.design.index]) - linear.data.log_marginal(without[linear.design.index])
+            found[module] = float(expit(gain / 10.0 + MODULE_ODDS))
+    return found
+
+
+def _with_modules(joint, withheld):
+    for module, p in withheld.items():
+        both = {}
+        for h, w in joint.items():
+            both[h] = both.get(h, 0.0) + w * (1 - p)
+            both[tuple(sorted((*h, module)))] = w * p
+        joint = both
+    return joint
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A unit's effects weighed: ``joint`` holds the probability of every set of them, ``withheld`` that of every module that the
+    baseline lacks."""
+
+    unit: Unit
+    weighed: Weighed
+    properties: tuple[Property, ...]
+    joint: dict
+    withheld: dict
+    rng: np.random.Generator
+    k: float
+    baseline: tuple
+    allowed: tuple | None
+    seed: int
+
+    @property
+    def linear(self) -> Linear:
+        """The linear model about the mode where no effect acts."""
+        return self.weighed.of(())
+
+    @cached_property
+    def named(self) -> tuple[str, ...]:
+        """The likeliest effects."""
+        likeliest = next(iter(self.labels()))
+        return () if likeliest == "none" else tuple(likeliest.split("+"))
+
+    @cached_property
+    def gap(self) -> where.Gap:
+        """What measurement and class leave between them."""
+        return where.estimate_gap(self.linear, self.rng)
+
+    @cached_property
+    def fits(self) -> tuple[Fitted, Fitted]:
+        """The class without and with the named effects; a process of each leg's own fits what is held out by itself, so that
+        something unknown closes nothing."""
+        return self.fitted(()), self.fitted(tuple(e for e in self.named if e != "unknown"))
+
+    @cached_property
+    def held_out(self) -> Shrink:
+        """What both leave of records that they have not seen."""
+        return shrink(*self.fits, self.gap.weight, self.rng)
+
+    @cached_property
+    def closed(self) -> dict | None:
+        """Closed fraction of all folds."""
+        return self.closed_of()
+
+    @cached_property
+    def doubted(self) -> bool:
+        """Whether the name explains too little of held-out data to be one."""
+        names = set(self.named) - {p.name for p in self.properties} - {STICK_SLIP, "unknown", *self.withheld}
+        gap = probabilities.log_misfit(self.weighed.left[()], probabilities.CALIBRATION.spread) > 0
+        return bool(names) and gap and self.closed is not None and self.closed["hi"] < LEAST_CLOSED
+
+    @property
+    def answers(self) -> dict[str, float]:
+        """Probabilities by the name of an answer, likeliest first, after the doubt about the likeliest."""
+        found = self.labels()
+        return given_to_unknown(found, next(iter(found))) if self.doubted else found
+
+    def labels(self) -> dict[str, float]:
+        """Probabilities by the name of an answer, likeliest first."""
+        modules = set(self.withheld)
+        found: dict[str, float] = {"none": 0.0, "unknown": 0.0}
+        for effects, p in self.joint.items():
+            named = [e for e in effects if e in modules]
+            # A module stays named where something unlisted acts beside it.
+            rest = (
+                []
+                if "unknown" in effects and named
+                else ["unknown"]
+                if "unknown" in effects
+                else [e for e in effects if e not in modules]
+            )
+            name = "+".join([*named, *rest]) or "none"
+            found[name] = found.get(name, 0.0) + p
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+    def fitted(self, effects) -> Fitted:
+        """A hypothesis in the linear model; what has no columns of its own stands for itself by those of the class."""
+        linear = with_columns(self.weighed, effects)
+        priors = levels(linear, tuple(effects))
+        for module in self.withheld:
+            if module not in effects:
+                for part in linear.reducer.parts:
+                    if part.module == module:
+                        priors[part.name] = (-14.0, 0.0)
+        return fit_hypothesis(linear, effects, priors)
+
+    def closed_of(self, fold=None) -> dict | None:
+        """Closed fraction of one fold or of all; None where only properties are named: the class holds them before and after."""
+        if self.named and set(self.named) <= {p.name for p in self.properties}:
+            return None
+        return self.held_out.closed("after", self.rng, LEVEL, fold)
+
+
+def given_to_unknown(answers: dict[str, float], name: str) -> dict[str, float]:
+    """The probabilities with a name's share given to unknown."""
+    answers = dict(answers)
+    answers["unknown"] = answers.get("unknown", 0.0) + answers.pop(name)
+    return dict(sorted(answers.items(), key=lambda item: -item[1]))
