@@ -10,6 +10,7 @@ import numpy as np
 from backdrive_bayes.engine.covariance import block_covariance, local_slope
 from backdrive_bayes.mechanics.effect import Context
 from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.lines import highest_line
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import Blocks, reduce_record
@@ -120,6 +121,16 @@ class Reduced(BlockMeans):
         return replace(
             self, blocks=self.blocks[:record] + self.blocks[record + 1 :], noise=self.noise[:record] + self.noise[record + 1 :]
         )
+
+
+def disturbance(reduced: Reduced) -> float:
+    """Log Bayes factor of a periodic disturbance in the record where it is clearest; minus infinity without a spectrum."""
+    found = []
+    for record, noise in zip(reduced.unit.records, reduced.noise, strict=True):
+        segments = find_segments(record.time_s, record.torque_nm)
+        line = highest_line(ChannelRecord(record.time_s, record.torque_nm, record.angle_rad, segments), noise)
+        found.append(-np.inf if line is None else line.log_factor)
+    return max(found)
 
 
 def reduce_unit(unit: Unit, blocks_per_leg: int | None = None) -> Reduced:

@@ -15,6 +15,7 @@ from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import AMPLITUDE, COARSE, fine_bank, wave_group, with_wave
+from backdrive_bayes.engine.reduced import disturbance
 from backdrive_bayes.engine.traces import trace_of
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
 from backdrive_bayes.mechanics.effect import TangentEffect
@@ -24,9 +25,9 @@ ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
 WAVES = "waves"
 MODULE_CHANGE = 0.05
 """Usual change of a module in shares of itself."""
-KINDS = (UNEXPLAINED, "module_change", "uneven", "step")
+KINDS = (UNEXPLAINED, "module_change", "uneven", "step", "line")
 """What something unlisted may be: a process on each leg, a module that changes in time, legs of two directions that part, a step
-in time; each as likely."""
+in time, a line in the spectrum of the noise; each as likely."""
 PAIRED = 6
 """Effects that are tried in pairs: those that explain most alone, and the first of them with every other."""
 
@@ -61,7 +62,8 @@ class Weighed:
 def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
     """Weigh none, every effect and the pairs of the most promising about every mode; ``allowed`` restricts the names."""
     jumps = find_jumps(linears[0])
-    tables = [_Table(linear, jumps) for linear in linears]
+    line = disturbance(linears[0].reduced)
+    tables = [_Table(linear, jumps, line) for linear in linears]
     names = [n for n in (*tables[0].terms, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
     level = [_level(table, names) if len(tables) > 1 else 0.0 for table in tables]
 
@@ -108,7 +110,7 @@ def _level(table: _Table, names) -> float:
 class _Table:
     """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods."""
 
-    def __init__(self, linear: Linear, jumps: Jumps):
+    def __init__(self, linear: Linear, jumps: Jumps, line: float):
         waves = replace(wave_group(linear, COARSE.waves), name=WAVES)
         unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
         self.linear, self.contrasts = linear, make_contrasts(linear, (*effect_groups(linear), *unlisted))
@@ -125,6 +127,7 @@ class _Table:
         self.one_way = {n: np.flatnonzero(contrasts.index == self.names.index(n)).tolist() for n in one_way}
         # What teeth leave in the block means, without and with an encoder's wave beside.
         self.jumping = {False: _traces(jumps), True: _traces(jumps)}
+        self.line = line
         self.frequency: dict[tuple[str, ...], float] = {}
         self.price: dict[tuple[str, ...], float] = {}
         self._scans: dict[frozenset[str], np.ndarray] = {}
@@ -144,6 +147,7 @@ class _Table:
         kinds = [self._of_terms(hypothesis, on | {k}) for k in KINDS[:3]]
         if ENCODER not in hypothesis:
             kinds.append(self._with_step(on))
+        kinds.append(self._of_terms(hypothesis, on) + self.line)
         return float(logsumexp(kinds) - np.log(len(kinds)))
 
     def _on(self, hypothesis) -> set:

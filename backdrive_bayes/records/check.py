@@ -9,10 +9,11 @@ import numpy as np
 from backdrive_bayes.records.branches import find_branches, find_segments
 from backdrive_bayes.records.faults import find_gaps, find_plateaus, find_wild, longest_frozen, quantum
 from backdrive_bayes.records.findings import Finding, errors_of, warnings_of
-from backdrive_bayes.records.judge_physics import judge_lost_motion, judge_physics, judge_rated_torque
+from backdrive_bayes.records.judge_physics import judge_line, judge_lost_motion, judge_physics, judge_rated_torque
+from backdrive_bayes.records.lines import highest_line
 from backdrive_bayes.records.measured_loop import measure_loop
 from backdrive_bayes.records.messages import judge_record
-from backdrive_bayes.records.noise import estimate_noise
+from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
 from backdrive_bayes.records.plausible import why_unfinished
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.shape import closure, cycle_count, extremes, loading_rate
@@ -59,6 +60,7 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
     segments = find_segments(time, torque)
     branches = find_branches(time, torque, segments)
     noise = estimate_noise(time, torque, angle, segments)
+    line = highest_line(ChannelRecord(time, torque, angle, segments), noise)
     loop, rise = measure_loop(record, segments, noise), angle_rise(torque, angle, segments, noise)
     low, high = extremes(torque, segments)
     found = {
@@ -91,6 +93,7 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
         *judge_physics(found, record.columns),
         *judge_lost_motion(found, rated_torque_nm, k),
         *judge_record(found, rated_torque_nm),
+        *judge_line(line),
     ]
     named = [replace(finding, record=record.name).to_json() for finding in findings]
     return {**found, "findings": named, "messages": [finding.message(full=False) for finding in findings]}

@@ -6,6 +6,7 @@ import math
 
 from backdrive_bayes.records.faults import stands_still
 from backdrive_bayes.records.findings import Finding
+from backdrive_bayes.records.lines import Line
 from backdrive_bayes.records.signs import inverted, not_answering
 from backdrive_bayes.records.wraps import LARGEST_STEP_RAD, TURN_RAD
 
@@ -42,6 +43,17 @@ def judge_rated_torque(rated_nm: float, tested_nm: float):
             "warning",
             "rated_torque",
             f"the largest torque tested, {tested_nm:.4g} N·m, is {much} the rated {rated_nm:.4g} N·m: wrong unit or column?",
+        )
+
+
+def judge_line(line: Line | None):
+    """A finding where something swings in the angle that is no noise."""
+    if line is not None and line.log_factor > 0.0:
+        yield Finding(
+            "warning",
+            "periodic_disturbance",
+            f"the angle swings at {line.frequency_hz:.3g} Hz (as sampled), {line.height:.2g} times the power of the "
+            "noise about it: mains hum, vibration, or a ripple of the torque that is not read",
         )
 
 

@@ -63,7 +63,7 @@ def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
 
     Records too short for a spectrum count only where all are; the angle's noise then comes from second differences.
     """
-    spectra = [_median_periodogram(r) for r in records if _longest(r) >= SHORTEST_WINDOW]
+    spectra = [median_periodogram(r) for r in records if longest(r) >= SHORTEST_WINDOW]
     if not spectra:
         return tuple(_rough_noise(r) for r in records)
     theta, covariance = _fit_spectra(spectra)
@@ -89,7 +89,7 @@ def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Spectrum:
+class Spectrum:
     """Median periodogram ``power`` at angular frequencies ``omega`` [rad/sample], and the weight of its ordinates."""
 
     power: np.ndarray
@@ -97,20 +97,27 @@ class _Spectrum:
     weight: float
     step_s: float
 
+    def model(self, log_correlated, log_white, log_correlation) -> np.ndarray:
+        """Expected power at the ordinates."""
+        phi = np.exp(-self.step_s / np.exp(log_correlation))
+        slow = np.exp(2 * log_correlated) * (1 - phi**2) / (1 - 2 * phi * np.cos(self.omega) + phi**2)
+        return slow + np.exp(2 * log_white) + 1e-9 * self.power.mean() + 1e-40
+
     def cost(self, theta):
         """Whittle's negative log likelihood of log(correlated), log(white), log(correlation time), and its gradient (3,)."""
         correlated, white, correlation = np.exp(theta)
         phi, cosine = np.exp(-self.step_s / correlation), np.cos(self.omega)
         below = 1 - 2 * phi * cosine + phi**2
         slow = correlated**2 * (1 - phi**2) / below
-        model = slow + white**2 + 1e-9 * self.power.mean() + 1e-40
+        model = self.model(*theta)
         by_phi = -2 * correlated**2 * (phi * below + (1 - phi**2) * (phi - cosine)) / below**2
         slopes = np.stack([2 * slow, np.full_like(slow, 2 * white**2), by_phi * phi * self.step_s / correlation])
         fit = self.power / model
         return self.weight * np.sum(np.log(model) + fit), self.weight * slopes @ ((1 - fit) / model)
 
 
-def _longest(record: ChannelRecord) -> int:
+def longest(record: ChannelRecord) -> int:
+    """Samples of the longest ramp."""
     return max(s.stop - s.start for s in record.segments)
 
 
@@ -123,9 +130,10 @@ def _rough_noise(record: ChannelRecord) -> NoiseEstimate:
     return NoiseEstimate(white, correlated, PRIOR_CORRELATION_TIME_S, torque[0], white, correlated, relative, torque[1], 4.0)
 
 
-def _median_periodogram(record: ChannelRecord) -> _Spectrum:
-    longest = _longest(record)
-    length = int(np.clip(longest // WINDOWS_PER_SEGMENT, min(32, longest), 2048))
+def median_periodogram(record: ChannelRecord) -> Spectrum:
+    """Median over short windows of a record, each free of its trend."""
+    most = longest(record)
+    length = int(np.clip(most // WINDOWS_PER_SEGMENT, min(32, most), 2048))
     starts = np.concatenate([np.arange(s.start, s.stop - length + 1, length) for s in record.segments])
     windows = record.angle_rad[starts.astype(int)[:, None] + np.arange(length)]
     basis = np.linalg.qr(np.vander(np.linspace(-1, 1, length), TREND_DEGREE + 1))[0]
@@ -138,7 +146,7 @@ def _median_periodogram(record: ChannelRecord) -> _Spectrum:
     # A Hann taper halves the independent ordinates, the median over windows has the efficiency ln(2)² of their mean.
     weight = len(starts) * 0.5 * np.log(2.0) ** 2
     omega = 2 * np.pi * np.fft.rfftfreq(length)[keep]
-    return _Spectrum(np.median(power[:, keep], axis=0) / np.log(2.0), omega, weight, float(np.median(np.diff(record.time_s))))
+    return Spectrum(np.median(power[:, keep], axis=0) / np.log(2.0), omega, weight, float(np.median(np.diff(record.time_s))))
 
 
 def _fit_spectra(spectra):

@@ -22,6 +22,7 @@ from backdrive_bayes.gap import examine, probabilities, properties, shrink, simu
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import reducer
 from backdrive_bayes.mechanics.registry import LIBRARY
+from backdrive_bayes.records import lines
 
 NUMBERS = {
     "unsettled": f"{reduced.UNSETTLED:g}",
@@ -45,6 +46,8 @@ NUMBERS = {
     "same_rate": f"{100 * simulator.SAME_RATE:g} %",
     "smallest_gap": f"{100 * shrink.SMALLEST_GAP:g} %",
     "sure": f"{properties.SURE:g}",
+    "usual_line": f"{lines.USUAL:g}",
+    "highest_line": f"{lines.HIGHEST:g}",
 }
 """Constants of the code that the pages name."""
 _LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]+\)")

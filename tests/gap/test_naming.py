@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.planted import LOOPS, PERIOD_RAD, UNITS, VARIANTS, planted, prepared, smooth_reducer
+from support.planted import LOOPS, PERIOD_RAD, UNITS, VARIANTS, changed, planted, prepared, smooth_reducer
 
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.gap import probabilities as gap
@@ -62,6 +62,15 @@ def test_teeth_that_leap_back_are_no_stick_slip():
     """A planted fault: on every leg the angle runs ahead and leaps back."""
     weighed = weigh(prepare(VARIANTS["teeth_back"]()))
     assert weighed.log_factor[("stick_slip",)] < 0
+
+
+@pytest.mark.parametrize(("hertz", "size", "named"), [(50.0, 4e-4, True), (50.0, 2e-5, False)])
+def test_a_hum_in_the_samples_is_something_unlisted(hertz, size, named):
+    """The means of blocks do not show it; a line no higher than any bench's resonance is not named."""
+    humming = changed(UNITS["none"](), lambda r, i: size * np.sin(2 * np.pi * hertz * r.time_s))
+    weighed = weigh(prepare(humming))
+    answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    assert (answers["unknown"] > 0.6) == named and (answers["unknown"] < 0.4) == (not named)
 
 
 def test_the_period_of_the_wave_is_found():

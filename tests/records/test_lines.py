@@ -1,0 +1,48 @@
+"""Lines in the spectrum of the angle's noise: a hum is found, noise and a bench's own resonance are none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.planted import HERTZ, planted
+
+from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.check import check_record
+from backdrive_bayes.records.lines import Line, highest_line
+from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
+
+
+def line_of(added, seed=0):
+    """The highest line of a planted record with ``added(time_s, rng)`` [rad] on its angle."""
+    record = planted(seed).records[0]
+    angle = record.angle_rad + added(record.time_s, np.random.default_rng(seed))
+    segments = find_segments(record.time_s, record.torque_nm)
+    noise = estimate_noise(record.time_s, record.torque_nm, angle, segments)
+    return highest_line(ChannelRecord(record.time_s, record.torque_nm, angle, segments), noise)
+
+
+@pytest.mark.parametrize("hertz", [7.0, 50.0, 450.0])
+def test_a_hum_is_found_at_its_frequency_as_sampled(hertz):
+    line = line_of(lambda t, rng: 4e-4 * np.sin(2 * np.pi * hertz * t))
+    folded = abs(hertz - HERTZ * round(hertz / HERTZ))
+    assert line.log_factor > 10 and line.frequency_hz == pytest.approx(folded, abs=2.0)
+
+
+@pytest.mark.parametrize("size", [0.0, 4e-4])
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_has_none_however_much_there_is(seed, size):
+    line = line_of(lambda t, rng: size * rng.standard_normal(t.size), seed)
+    assert line.height < 3 and line.log_factor < -0.5
+
+
+def test_the_evidence_grows_with_the_height_and_starts_below_none():
+    height = np.array([2.0, 8.0, 20.0, 50.0, 1e3])
+    factor = [Line(50.0, h).log_factor for h in height]
+    assert np.all(np.diff(factor[1:]) > 0) and factor[1] < 0 < factor[3] and Line(50.0, 0.5).log_factor == -np.inf
+
+
+def test_the_check_warns_of_it():
+    record = planted(0).records[0]
+    humming = replace(record, angle_rad=record.angle_rad + 4e-4 * np.sin(2 * np.pi * 50.0 * record.time_s))
+    told = [[f["code"] for f in check_record(r, 0.1)["findings"]] for r in (record, humming)]
+    assert "periodic_disturbance" not in told[0] and "periodic_disturbance" in told[1]
