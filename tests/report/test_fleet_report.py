@@ -1,7 +1,5 @@
 """The fleet's pages: what a reader must find on them, from a fleet made by hand."""
 
-import io
-
 import numpy as np
 import pytest
 from support.fleet_units import row
@@ -32,7 +30,7 @@ def made(shift=0.0, failures=3):
 
 
 def text_of(result, folder):
-    import pypdf
+    from support.pdf import Pages
 
     from backdrive_bayes.report.report import report_bytes
 
@@ -40,9 +38,9 @@ def text_of(result, folder):
     write_json(folder / "fleet.json", result)
     pdf = report_bytes([folder])
     assert pdf == report_bytes([folder])
-    reader = pypdf.PdfReader(io.BytesIO(pdf))
-    links = [a.get_object()["/A"].get("/URI") for page in reader.pages for a in page.get("/Annots") or []]
-    return " ".join(" ".join(page.extract_text() for page in reader.pages).split()), links
+    pages = Pages(pdf)
+    links = [a.get_object()["/A"].get("/URI") for page in pages.reader.pages for a in page.get("/Annots") or []]
+    return pages.text, links
 
 
 def test_a_shift_is_said_with_the_rate_of_false_alarms_and_where_it_begins(tmp_path):
