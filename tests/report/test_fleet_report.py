@@ -43,25 +43,31 @@ def text_of(result, folder):
     return pages.text, links
 
 
+@pytest.fixture(scope="module")
+def steady(tmp_path_factory):
+    """The words and links of a fleet without drift."""
+    return text_of(made(), tmp_path_factory.mktemp("steady"))
+
+
 def test_a_shift_is_said_with_the_rate_of_false_alarms_and_where_it_begins(tmp_path):
     text, _ = text_of(made(shift=0.1), tmp_path / "f")
     assert "drift of lost motion δ, dissipated energy S, dissipation ratio u" in text
     assert "from about unit-20 on" in text and "at most 1 % get an alarm" in text and "by chance 0.001" in text
 
 
-def test_a_fleet_without_drift_says_so(tmp_path):
-    text, _ = text_of(made(), tmp_path / "f")
+def test_a_fleet_without_drift_says_so(steady):
+    text, _ = steady
     assert "30 of 33 units have a result; no drift found" in text and "from about" not in text
 
 
-def test_units_to_look_at_lead_to_their_files(tmp_path):
-    text, links = text_of(made(), tmp_path / "f")
+def test_units_to_look_at_lead_to_their_files(steady):
+    text, links = steady
     assert links[:2] == ["units/key-9.json", "units/key-4.json"]
     assert "rejected, conforms with probability 0.020" in text and "sigma from the centre" in text
 
 
-def test_counts_batches_and_failures_are_told(tmp_path):
-    text, _ = text_of(made(), tmp_path / "f")
+def test_counts_batches_and_failures_are_told(steady):
+    text, _ = steady
     assert "accepted 29, rejected 1" in text and "none 29, thermal drift 1" in text
     assert "spring 20" in text and "autumn 10" in text and "Kruskal" in text
     assert "bad-2" in text and "expected a cycle, found none (2)" in text and "3 failed" in text
