@@ -18,7 +18,7 @@ try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
         from matplotlib.ticker import MaxNLocator
-        from matplotlib.transforms import ScaledTranslation
+        from matplotlib.transforms import Bbox, ScaledTranslation
 except ImportError:
     raise MissingExtra("drawing figures", "matplotlib", "figures") from None
 
@@ -103,7 +103,7 @@ def settled(figures: dict[str, Figure]) -> dict[str, Figure]:
         for part in figure.subfigs:
             part.bbox_relative.set_points(part.bbox_relative.get_points().round(5))
         for axes in figure.axes:
-            axes.set_position([round(x, 5) for x in axes.get_position().bounds])
+            axes.set_position(Bbox.from_bounds(*(round(x, 5) for x in axes.get_position().bounds)))
     return figures
 
 
