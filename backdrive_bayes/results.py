@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import gc
 import hashlib
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -55,37 +52,12 @@ def read_result(path: Path, schema: str) -> dict:
 
 def read_group(path: Path, group: str):
     """One group of a posterior file as an xarray dataset in memory; BadInput where the file is not one of ours."""
-    import xarray
-
-    fault = ""
-    with _forgetting_quietly():
-        try:
-            with xarray.open_dataset(path, group=group, engine="h5netcdf") as dataset:
-                loaded = dataset.load()
-        except UNREADABLE as error:
-            fault = type(error).__name__
-        if fault:
-            gc.collect()
-    if fault:
-        raise BadInput(path, f"a posterior.nc with group '{group}'", f"unreadable file ({fault})")
-    if loaded.attrs.get("schema") != POSTERIOR:
-        raise BadInput(path, f"schema '{POSTERIOR}'", repr(loaded.attrs.get("schema")))
-    return loaded
-
-
-@contextlib.contextmanager
-def _forgetting_quietly():
-    """h5netcdf closes a file that it could not open when it is forgotten, fails, and says so on standard error."""
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
-    try:
-        yield
-    finally:
-        sys.unraisablehook = hook
+    return _read(path, (group,))[group]
 
 
 def read_groups(path: Path) -> dict:
     """All groups of a posterior file by name; BadInput where it is not as it was written."""
-    groups = {name: read_group(path, name) for name in GROUPS}
+    groups = _read(path, GROUPS)
     try:
         whole = {g.attrs.get(SEAL) for g in groups.values()} == {digest_of(groups)}
     except (TypeError, ValueError):
@@ -93,6 +65,34 @@ def read_groups(path: Path) -> dict:
     if not whole:
         raise BadInput(path, "the file as it was written", "changed or missing bytes (fit the unit again)")
     return groups
+
+
+def _read(path, names):
+    """Groups of a posterior file by name, the file opened once: xarray's own reader opens it anew for each and looks every
+    variable up a hundred times.
+    """
+    import h5py
+
+    loaded, name = {}, names[0]
+    try:
+        with h5py.File(path) as file:
+            for name in names:
+                loaded[name] = _dataset(file[name])
+    except UNREADABLE as error:
+        raise BadInput(path, f"a posterior.nc with group '{name}'", f"unreadable file ({type(error).__name__})") from None
+    for found in (group.attrs.get("schema") for group in loaded.values()):
+        if found != POSTERIOR:
+            raise BadInput(path, f"schema '{POSTERIOR}'", repr(found))
+    return loaded
+
+
+def _dataset(group):
+    """An HDF5 group in netCDF's conventions as an xarray dataset: dimensions are named by the scales attached to them."""
+    import xarray
+
+    held = {name: item for name, item in group.items() if not item.is_scale}
+    variables = {n: ([scales[0].name.rsplit("/", 1)[1] for scales in item.dims], item[()]) for n, item in held.items()}
+    return xarray.Dataset(variables, attrs={n: a if isinstance(a, str) else a.item() for n, a in group.attrs.items()})
 
 
 def digest_of(groups: dict) -> str:

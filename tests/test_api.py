@@ -1,9 +1,12 @@
 """The five lines of the README, results that show themselves, and the example scripts."""
 
+import copy
 import json
 import os
+import runpy
 import subprocess
 import sys
+import warnings
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -95,22 +98,54 @@ def run(script, *arguments):
     return done.stdout
 
 
-def test_example_five_lines(units, tmp_path):
+@pytest.fixture(scope="module")
+def once():
+    """In place of ``fit_unit``: what is fitted twice with the same options is computed once."""
+    compute, known = backdrive_bayes.api.fit_unit, {}
+
+    def fit_unit(unit, options, note):
+        key = unit.data_sha256, options
+        if key not in known:
+            known[key] = compute(unit, options, note)
+        return copy.deepcopy(known[key])
+
+    return fit_unit
+
+
+@pytest.fixture
+def run_here(once, monkeypatch, capsys):
+    """Like ``run``, in this process, so that the scripts share their fits."""
+
+    def run_script(script, *arguments):
+        path = ROOT / "examples" / script
+        monkeypatch.setattr(backdrive_bayes.api, "fit_unit", once)
+        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
+        monkeypatch.syspath_prepend(path.parent)
+        monkeypatch.chdir(ROOT)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            runpy.run_path(str(path), run_name="__main__")
+        return capsys.readouterr().out
+
+    return run_script
+
+
+def test_example_five_lines(run_here, units, tmp_path):
     limits = tmp_path / "limits.toml"
     limits.write_text("[peak_angle_rad]\nmax = 1")
-    said = run("five_lines.py", units[0], "--limits", limits, "--out", tmp_path / "out")
+    said = run_here("five_lines.py", units[0], "--limits", limits, "--out", tmp_path / "out")
     assert said.startswith("a: ") and (tmp_path / "out" / "report.pdf").exists()
 
 
-def test_example_compare_units(units, tmp_path):
-    said = run("compare_units.py", *units, "--out", tmp_path / "out")
+def test_example_compare_units(run_here, units, tmp_path):
+    said = run_here("compare_units.py", *units, "--out", tmp_path / "out")
     assert "A turns less than B at every rate" in said and (tmp_path / "out" / "report.pdf").exists()
 
 
-def test_example_acceptance_by_batch(units, tmp_path):
+def test_example_acceptance_by_batch(run_here, units, tmp_path):
     limits = tmp_path / "limits.toml"
     limits.write_text("[peak_angle_rad]\nmax = 1")
-    said = run("acceptance_by_batch.py", units[0], *[units[1]] * 3, "--limits", limits)
+    said = run_here("acceptance_by_batch.py", units[0], *[units[1]] * 3, "--limits", limits)
     assert "global risks: {" in said
 
 

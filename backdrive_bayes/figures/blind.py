@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backdrive_bayes.figures.style import BLUE, GREY, SERIES, Figure, legend_below, new_figure, styled, words
+from backdrive_bayes.figures.style import BLUE, GREY, SERIES, Figure, legend_below, new_figure, settled, styled, words
 
 CAPTIONS = {
     "confusion": "True effects (rows) and answers of the diagnosis (columns), in units; shade is the share of the row.",
@@ -18,7 +18,7 @@ def blind_figures(result: dict) -> dict[str, Figure]:
     """Every figure of the object of blind.json, by the names of ``CAPTIONS``."""
     draw = {"confusion": _confusion, "power": _power, "reliability": _reliability, "sets": _sets}
     with styled():
-        return {name: draw[name](result) for name in CAPTIONS}
+        return settled({name: draw[name](result) for name in CAPTIONS})
 
 
 def _confusion(result):

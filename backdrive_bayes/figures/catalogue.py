@@ -25,7 +25,7 @@ from backdrive_bayes.figures import (
 from backdrive_bayes.figures.diagnosis_saved import FILE as DIAGNOSIS
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import PER_FIGURE, PNG_DPI, SERIES, Figure, numbered, styled
+from backdrive_bayes.figures.style import PER_FIGURE, PNG_DPI, SERIES, Figure, numbered, settled, styled
 from backdrive_bayes.results import BLIND, COMPARISON, FLEET, POOL, VERDICT, read_result
 
 CAPTIONS = {
@@ -75,13 +75,14 @@ def figures_of(saved: Saved, wanted=lambda name: True) -> dict[str, Figure]:
         makers |= numbered("corner", corner_plot.draw, saved, shared, corner_plot.in_one_figure(len(shared)))
         makers["trace"] = partial(trace.draw, saved)
         makers |= numbered("predictive", predictive.draw, saved, everything, PER_FIGURE)
-    return {name: make() for name, make in makers.items() if wanted(name)}
+    return settled({name: make() for name, make in makers.items() if wanted(name)})
 
 
 def verdict_figures(verdict: dict) -> dict[str, Figure]:
     """The figures of a verdict object: acceptance, acceptance-2, …"""
     rows = list(range(len(verdict["limits"])))
-    return {name: make() for name, make in numbered("acceptance", acceptance.draw, verdict, rows, acceptance.AT_MOST).items()}
+    makers = numbered("acceptance", acceptance.draw, verdict, rows, acceptance.AT_MOST)
+    return settled({name: make() for name, make in makers.items()})
 
 
 def comparison_figures(result: dict) -> dict[str, Figure]:
@@ -91,7 +92,7 @@ def comparison_figures(result: dict) -> dict[str, Figure]:
     makers |= numbered("comparison-energy", comparison.draw_energy, result, overlays, PER_FIGURE)
     makers |= numbered("comparison-ratios", comparison.draw_ratios, result, comparison.with_ratios(result), 1)
     makers["comparison-mechanism"] = partial(comparison.draw_mechanism, result)
-    return {name: make() for name, make in makers.items()}
+    return settled({name: make() for name, make in makers.items()})
 
 
 _OF_FILE = {

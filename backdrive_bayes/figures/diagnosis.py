@@ -17,7 +17,7 @@ from backdrive_bayes.figures import (
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_which import bar_lines, draw_bars
 from backdrive_bayes.figures.diagnosis_words import answer_words, drawable
-from backdrive_bayes.figures.style import PER_FIGURE, PNG_DPI, Figure, new_figure, numbered, styled
+from backdrive_bayes.figures.style import PER_FIGURE, Figure, new_figure, numbered, settled, styled
 
 CAPTION = (
     "The diagnosis at a glance. Left: probability of each cause. Right: rms of the gap on held-out data before "
@@ -39,8 +39,8 @@ MAP_IN = 2.6
 _LINE = 104
 
 
-def figures_of(saved: Diagnosed) -> dict[str, Figure]:
-    """Every figure that the saved parts allow, by name."""
+def figures_of(saved: Diagnosed, wanted=lambda name: True) -> dict[str, Figure]:
+    """Every figure that the saved parts allow, as far as ``wanted`` by name."""
     everything = list(range(len(saved.records)))
     makers = {"diagnosis": partial(draw, saved)} if saved.result["which"] or saved.cells else {}
     if saved.cells:
@@ -54,21 +54,7 @@ def figures_of(saved: Diagnosed) -> dict[str, Figure]:
         makers["parameter-shift"] = partial(diagnosis_shift.draw, saved)
     if saved.simulator.get("told") and not saved.inconclusive:
         makers["simulator"] = partial(diagnosis_simulated.draw, saved)
-    return {name: _settled(make()) for name, make in makers.items()}
-
-
-def _settled(figure):
-    """Fix the layout; the solver's last bits vary from run to run, and the files would show it."""
-    with styled():
-        # Letters are a little wider at some resolutions: room for them as they are printed.
-        figure.set_dpi(PNG_DPI)
-        figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    for part in figure.subfigs:
-        part.bbox_relative.set_points(part.bbox_relative.get_points().round(5))
-    for axes in figure.axes:
-        axes.set_position([round(x, 5) for x in axes.get_position().bounds])
-    return figure
+    return settled({name: make() for name, make in makers.items() if wanted(name)})
 
 
 def draw(saved: Diagnosed):

@@ -15,6 +15,7 @@ from backdrive_bayes.figures.style import (
     few_ticks,
     legend_below,
     new_figure,
+    settled,
     styled,
     two_lines,
     words,
@@ -52,7 +53,7 @@ def fleet_figures(result: dict) -> dict[str, Figure]:
         found = {"fleet-charts": _charts(result), "fleet-distributions": _distributions(result)} if result["charts"] else {}
         if result["verdicts"] or result["effects"]:
             found["fleet-shares"] = _shares(result)
-    return found
+    return settled(found)
 
 
 def _charts(result):

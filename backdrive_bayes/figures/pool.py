@@ -12,6 +12,7 @@ from backdrive_bayes.figures.style import (
     few_ticks,
     legend_below,
     new_figure,
+    settled,
     shown_unit,
     styled,
     two_lines,
@@ -40,7 +41,7 @@ def pool_figures(result: dict) -> dict[str, Figure]:
     with styled():
         chosen, spreads = shown_quantities(result), [q for q in result["quantities"] if not q["refused"] and q["scale"] == "log"]
         found = {"pool-units": _units(chosen)} if chosen else {}
-        return found | ({"pool-spread": _spreads(spreads)} if spreads else {})
+        return settled(found | ({"pool-spread": _spreads(spreads)} if spreads else {}))
 
 
 def shown_quantities(result: dict) -> list[dict]:

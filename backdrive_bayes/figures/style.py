@@ -18,7 +18,7 @@ try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
         from matplotlib.ticker import MaxNLocator
-        from matplotlib.transforms import ScaledTranslation
+        from matplotlib.transforms import Bbox, ScaledTranslation
 except ImportError:
     raise MissingExtra("drawing figures", "matplotlib", "figures") from None
 
@@ -88,6 +88,23 @@ def new_figure(height_in: float, constrained: bool = True) -> Figure:
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained" if constrained else None)
     FigureCanvasAgg(figure)
     return figure
+
+
+def settled(figures: dict[str, Figure]) -> dict[str, Figure]:
+    """The figures with their layout fixed: solved once, and rounded, for the solver's last bits vary from run to run."""
+    for figure in figures.values():
+        if (solver := figure.get_layout_engine()) is None:
+            continue
+        with styled():
+            # Letters are a little wider at some resolutions: room for them as they are printed.
+            figure.set_dpi(PNG_DPI)
+            solver.execute(figure)
+            figure.set_layout_engine(None)
+        for part in figure.subfigs:
+            part.bbox_relative.set_points(part.bbox_relative.get_points().round(5))
+        for axes in figure.axes:
+            axes.set_position(Bbox.from_bounds(*(round(x, 5) for x in axes.get_position().bounds)))
+    return figures
 
 
 def few_ticks(axes, x: int = 4, y: int | None = 5) -> None:

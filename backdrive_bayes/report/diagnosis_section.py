@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from backdrive_bayes.figures import diagnosis
@@ -19,12 +20,14 @@ from backdrive_bayes.results import usable
 
 LISTED = 4
 """Records that the summary names."""
+SHOWN = ("diagnosis", "gap-residual", "simulator")
+"""Figures that the report shows, beside the map of many records."""
 
 
 def chapter(folder: Path) -> Chapter:
     """Read a result folder of ``diagnose`` and lay out its pages."""
     saved = Diagnosed.read(folder)
-    figures = diagnosis.figures_of(saved)
+    figures = diagnosis.figures_of(saved, partial(_shown, saved))
     title = Free(free(saved.result["unit"], 66) + ": diagnosis")
     overview = [("diagnosis", caption("diagnosis"))] if "diagnosis" in figures else []
     return Chapter(
@@ -44,6 +47,13 @@ def chapter(folder: Path) -> Chapter:
         terms=[Heading("Diagnosis"), Facts(TERMS)] if saved.result["which"] else [],
         provisional=not usable(saved.result),
     )
+
+
+def _shown(saved, name):
+    """Whether the report shows a figure; the others stand in the result folder only."""
+    if name.startswith("gap-map"):  # it stands on the summary already, unless that had no room for all records
+        return len(saved.records) > len(diagnosis.mapped(saved))
+    return name in SHOWN
 
 
 def _identity(saved):
@@ -69,14 +79,12 @@ def _details(saved, figures) -> list[Block]:
     def pictures(kind):
         return [Picture(n, caption(n, saved.level)) for n in figures if n == kind or n.startswith(f"{kind}-")]
 
-    # The map stands on the summary already, unless that had no room for all records.
-    mapped = pictures("gap-map") if len(saved.records) > len(diagnosis.mapped(saved)) else []
     parts = (
         ("Which effect", [*tables.probabilities(saved), *tables.effect_parameters(saved)] if saved.effects else []),
         ("Next test", next_test(saved)),
         ("How far it shrinks", tables.shrink(saved) if saved.added else []),
         ("What it changes", [*tables.indicators(saved), *tables.parameter_shift(saved)] if saved.added else []),
         ("", tables.convergence(saved) if saved.effects else []),
-        ("Where the gap lies", [*mapped, *pictures("gap-residual")[:1]] if saved.effects else []),
+        ("Where the gap lies", [*pictures("gap-map"), *pictures("gap-residual")] if saved.effects else []),
     )
     return [b for name, blocks in parts if blocks for b in (*([Heading(name)] if name else []), *blocks)]

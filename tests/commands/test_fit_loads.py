@@ -41,9 +41,9 @@ def test_loads_are_answered_in_the_file_and_on_the_screen(unit_folder, tmp_path,
 
 
 def test_without_loads_there_is_no_such_key_and_python_may_ask_later(unit_folder):
-    fitted = backdrive_bayes.fit(unit_folder, seed=1)
+    fitted = backdrive_bayes.fit(unit_folder)
     assert "loads" not in fitted.indicators
-    asked = backdrive_bayes.fit(unit_folder, seed=1, loads=[0.5], load_rate=1.0).indicators["loads"]
+    asked = backdrive_bayes.fit(unit_folder, loads=[0.5], load_rate=1.0).indicators["loads"]
     later = fitted.back_drive(0.5, rate=1.0)
     assert asked[0].keys() == later[0].keys()
     assert asked[0]["theta_L_rad"]["median"] == pytest.approx(later[0]["theta_L_rad"]["median"], rel=0.05)

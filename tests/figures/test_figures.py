@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -33,6 +34,7 @@ def figures(folder):
     return catalogue.all_figures(folder)
 
 
+@cache
 def texts(figure):
     """Texts that are drawn, with their boxes in pixels."""
     with styled():

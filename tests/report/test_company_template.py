@@ -1,14 +1,13 @@
 """A company's template dresses the report, its texts print as they stand, and what is wrong with it is one clear line."""
 
-import io
 import shutil
 import struct
 import zlib
 from pathlib import Path
 
-import pypdf
 import pytest
 from support.decided import diagnosis, evidence
+from support.pdf import Pages
 from support.told import told
 from support_results import write_result
 
@@ -63,25 +62,20 @@ def result(tmp_path_factory):
 @pytest.fixture(scope="module")
 def dressed(result):
     data = report.report_bytes([result], read_template(EXAMPLE))
-    return data, pypdf.PdfReader(io.BytesIO(data))
-
-
-def texts(data):
-    return [" ".join(p.extract_text().split()) for p in pypdf.PdfReader(io.BytesIO(data)).pages]
+    return data, Pages(data)
 
 
 def test_the_first_page_is_the_company_s(dressed):
-    data, reader = dressed
-    first, *later = texts(data)
+    first, *later = dressed[1]
     assert first.startswith(FIRST_PAGE)
     assert first.endswith(f"Tested by Released by Date Test report: u: acceptance {LAST_LINE} page 1 of 2")
     assert "Signature" not in first
     assert [t.startswith("Example Drives Ltd ") and t.endswith(f"{LAST_LINE} page 2 of 2") for t in later] == [True]
-    assert reader.metadata.title == "Test report: u: acceptance"
+    assert dressed[1].reader.metadata.title == "Test report: u: acceptance"
 
 
 def test_it_is_still_tagged_with_a_logo_that_is_told_in_words(dressed):
-    root = dressed[1].trailer["/Root"]
+    root = dressed[1].reader.trailer["/Root"]
     assert root["/MarkInfo"]["/Marked"] and b"<pdfuaid:part>1</pdfuaid:part>" in root["/Metadata"].get_data()
     assert "Example Drives: a gear around a hysteresis loop" in list(alternatives(root["/StructTreeRoot"]))
 
@@ -105,7 +99,7 @@ def test_no_text_is_below_8_pt_and_all_fonts_are_embedded(dressed):
         if text.strip():
             sizes.add(round(abs(size * tm[3] * cm[3]), 2))
 
-    for page in dressed[1].pages:
+    for page in dressed[1].reader.pages:
         page.extract_text(visitor_text=see)
         for font in page["/Resources"].get("/Font", {}).values():
             inner = font.get_object()["/DescendantFonts"][0].get_object() if "/DescendantFonts" in font.get_object() else font
@@ -124,13 +118,14 @@ def test_headings_and_lines_take_the_colours_and_the_verdict_keeps_its_own(resul
 def test_the_same_template_gives_the_same_bytes_and_an_empty_one_the_plain_text(dressed, result, tmp_path):
     assert report.report_bytes([result], read_template(EXAMPLE)) == dressed[0]
     plain = report.report_bytes([result])
-    assert texts(report.report_bytes([result], read_template(template(tmp_path / "t", "")))) == texts(plain)
-    assert "Example" not in "".join(texts(plain))
+    empty = report.report_bytes([result], read_template(template(tmp_path / "t", "")))
+    assert list(Pages(empty)) == list(Pages(plain))
+    assert "Example" not in Pages(plain).text
 
 
 def test_a_png_logo_without_a_name_and_paper_of_another_size(result, tmp_path):
     folder = template(tmp_path / "t", 'paper = "us-letter"', png=png())
-    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([result], read_template(folder))))
+    reader = Pages(report.report_bytes([result], read_template(folder))).reader
     assert [float(v) for v in reader.pages[0].mediabox[2:]] == [612, 792]
     assert len(reader.pages[0].images) == 1 and "Company logo" in list(alternatives(reader.trailer["/Root"]["/StructTreeRoot"]))
 
@@ -140,10 +135,10 @@ def test_texts_print_as_they_stand(result, tmp_path):
     text = "".join(f"{k} = '{HOSTILE}'\n" for k in keys)
     text += f"address = ['{HOSTILE}']\n[fields]\n'#a $b$ *c*' = '''{HOSTILE}\n d'''"
     folder = template(tmp_path / "t", text, svg=svg())
-    data = report.report_bytes([result], read_template(folder))
-    first = texts(data)[0]
+    pages = Pages(report.report_bytes([result], read_template(folder)))
+    first = pages[0]
     assert first.count(HOSTILE) == 5 and f"#a $b$ *c* {HOSTILE} d" in first
-    reader = pypdf.PdfReader(io.BytesIO(data))
+    reader = pages.reader
     assert reader.metadata.title.startswith(HOSTILE) and HOSTILE in list(alternatives(reader.trailer["/Root"]["/StructTreeRoot"]))
 
 
@@ -152,7 +147,7 @@ def test_a_full_summary_stays_one_page(tmp_path):
     (tmp_path / "fit" / "posterior.nc").unlink()
     rows = "\n".join(f'"Label number {i}" = "{"word " * 8}"' for i in range(8))
     folder = template(tmp_path / "t", f'company = "C"\naddress = ["1", "2", "3", "4"]\n[fields]\n{rows}', svg=svg())
-    first = texts(report.report_bytes([tmp_path / "fit"], read_template(folder)))[0]
+    first = Pages(report.report_bytes([tmp_path / "fit"], read_template(folder)))[0]
     assert "Label number 7" in first and "CONVERGED" in first and "Signature" in first
 
 
@@ -247,7 +242,7 @@ def test_folders_that_are_no_template(tmp_path):
 def test_the_verb_takes_a_template_and_writes_nothing_with_a_bad_one(result, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["report", str(result), "-o", str(out), "--template", str(EXAMPLE)]) == 0
-    assert texts((out / "report.pdf").read_bytes())[0].startswith("Example Drives Ltd")
+    assert Pages((out / "report.pdf").read_bytes())[0].startswith("Example Drives Ltd")
     shutil.rmtree(out)
     capsys.readouterr()
     for bad in (tmp_path / "missing", template(tmp_path / "a", "x = 1"), template(tmp_path / "b", svg=svg(""))):

@@ -1,13 +1,12 @@
 """The PDF holds the numbers of verdict.json and comparison.json, with their levels and units."""
 
-import io
 import json
 import re
 
-import pypdf
 import pytest
 from matplotlib.figure import Figure
 from support.decided import diagnosis, evidence
+from support.pdf import Pages
 from support.told import told
 
 from backdrive_bayes.commands.output import write_json
@@ -28,8 +27,7 @@ HOSTILE = "#strong[x] $y$ *b* @ref"
 
 
 def pages(folder):
-    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([folder])))
-    return [" ".join(p.extract_text().split()) for p in reader.pages], reader
+    return Pages(report.report_bytes([folder]))
 
 
 @pytest.fixture(scope="module")
@@ -41,11 +39,11 @@ def verdict(tmp_path_factory):
         Limit("absorbed_J", hi=5.6e-4, rate=0.05, amplitude=0.06),
     )
     write_json(folder / "verdict.json", told(assess([evidence(HOSTILE)], Limits(limits))))
-    return json.loads((folder / "verdict.json").read_text()), *pages(folder)
+    return json.loads((folder / "verdict.json").read_text()), pages(folder)
 
 
 def test_the_first_page_can_be_signed(verdict):
-    result, text, _ = verdict
+    result, text = verdict
     first = text[0]
     assert "INCONCLUSIVE" in first and "Signature" in first and "Next:" in first
     (digest,) = result["reproduction"]["data_sha256"]
@@ -56,15 +54,15 @@ def test_the_first_page_can_be_signed(verdict):
 
 
 def test_the_banner_says_indicators_in_words(verdict):
-    result, text, _ = verdict
+    result, text = verdict
     assert "absorbed_J" in result["next"]["do"]
     assert "the verdict on absorbed energy Wabs rests on a prediction" in text[0].replace("W abs", "Wabs")
-    assert "absorbed_J" not in " ".join(text)
+    assert "absorbed_J" not in text.text
 
 
 def test_every_limit_stands_with_its_numbers(verdict):
-    result, text, _ = verdict
-    whole = " ".join(text)
+    result, text = verdict
+    whole = text.text
     for row in result["limits"]:
         factor = ARCMIN if row["unit"] == "rad" else 1e3
         assert interval_text(row, factor) in whole
@@ -78,7 +76,7 @@ def test_every_limit_stands_with_its_numbers(verdict):
 def test_what_is_uncovered_is_named(tmp_path):
     found = diagnosis(["sensor_lag"], sensor_lag=0.8, none=0.2)
     write_json(tmp_path / "verdict.json", told(assess([evidence(diagnosis=found)], Limits((Limit("peak_angle_rad", hi=1.0),)))))
-    text, _ = pages(tmp_path)
+    text = pages(tmp_path)
     assert "sensor lag (80 %)" in text[0] and "in no model at hand with probability 0.80: sensor lag 0.80" in text[0]
 
 
@@ -87,12 +85,12 @@ def comparison(tmp_path_factory):
     folder = tmp_path_factory.mktemp("comparison")
     a, b = evidence("metal"), evidence("plastic", seed=1, loop_area_J=1.9e-3, loops=((0.05, 0.1), (0.5, 0.1)))
     write_json(folder / "comparison.json", told(compare([a, b], read_claims("paper"))))
-    return json.loads((folder / "comparison.json").read_text()), *pages(folder)
+    return json.loads((folder / "comparison.json").read_text()), pages(folder)
 
 
 def test_a_comparison_holds_its_numbers(comparison):
-    result, text, _ = comparison
-    whole = " ".join(text)
+    result, text = comparison
+    whole = text.text
     (condition,) = result["pairs"][0]["conditions"]
     for name in ("loop_area_J", "peak_angle_rad"):
         row = condition["indicators"][name]
@@ -105,7 +103,7 @@ def test_a_comparison_holds_its_numbers(comparison):
 def test_a_unit_that_has_not_converged_is_named_and_the_others_stand(tmp_path):
     units = [evidence("a"), evidence("b", seed=1), evidence("c", seed=2, converged=False)]
     write_json(tmp_path / "comparison.json", told(compare(units)))
-    text, _ = pages(tmp_path)
+    text = pages(tmp_path)
     assert "INCONCLUSIVE IN PART" in text[0] and "The fits of c are not to be used" in text[0]
     assert "a and b at" in text[0]
 
@@ -114,13 +112,13 @@ def test_a_difference_is_not_called_a_ratio(tmp_path):
     units = [evidence("a"), evidence("b", seed=1, loop_area_J=[1e-9] * 3, spread=2.0)]
     write_json(tmp_path / "comparison.json", told(compare(units)))
     row = read_result(tmp_path / "comparison.json", COMPARISON)["pairs"][0]["conditions"][0]["indicators"]["loop_area_J"]
-    text, _ = pages(tmp_path)
+    text = pages(tmp_path)
     assert row["ratio"] is None and f"{interval_text(row['difference'], 1e3)} difference [mJ]" in text[0]
 
 
 def test_claims_stand_with_probability_and_verdict(comparison):
-    result, text, _ = comparison
-    whole = " ".join(text)
+    result, text = comparison
+    whole = text.text
     for claim in result["claims"]["claims"]:
         start = re.escape(claim["claim"][:24])
         assert re.search(start, whole), claim["claim"]
@@ -136,7 +134,7 @@ def test_claims_are_counted_in_a_sentence():
 
 
 def test_a_value_stays_on_one_line_with_its_interval(comparison):
-    lines = [line for page in comparison[2].pages for line in page.extract_text().splitlines()]
+    lines = [line for page in comparison[1].reader.pages for line in page.extract_text().splitlines()]
     broken = [line for line in lines if re.search(r"\[[−\d.]*,?( [−\d.]+)?$|^[−\d., ]*\]", line.strip())]
     assert sum("]" in line for line in lines) > 30 and not broken
 
@@ -153,7 +151,7 @@ def test_a_summary_bears_as_many_pictures_as_have_room(monkeypatch, tmp_path):
     details = [Picture(n, f"caption of the {n}", spilt=True) for n in names]
     made = [Chapter("c", summary, details, {n: Figure(figsize=(6.7, 3.6)) for n in names})]
     monkeypatch.setattr(sections, "chapters", lambda folder: made)
-    text, _ = pages(tmp_path)
+    text = pages(tmp_path)
     assert re.findall(r"caption of the (\w+)", text[0]) == ["first", "second"]
     assert re.findall(r"caption of the (\w+)", " ".join(text[1:])) == ["third"]
 
@@ -161,7 +159,7 @@ def test_a_summary_bears_as_many_pictures_as_have_room(monkeypatch, tmp_path):
 def test_a_chapter_does_not_begin_at_the_foot_of_a_page(monkeypatch, tmp_path):
     made = [Chapter(f"c{i}", [Heading(f"c{i}", 1)], [Paragraph("text")] * (3 + i), {}) for i in range(20)]
     monkeypatch.setattr(sections, "chapters", lambda folder: made)
-    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path])))
+    reader = pages(tmp_path).reader
     heights = chapter_heights(reader)
     assert len(heights) == 2 * len(made) + 2
     assert min(heights) > (20 + 60) / 25.4 * 72
@@ -182,9 +180,9 @@ def chapter_heights(reader):
 
 
 def test_tags_and_outline(comparison, verdict):
-    for _, _, reader in (comparison, verdict):
-        assert reader.trailer["/Root"]["/MarkInfo"]["/Marked"]
-    titles = [i.title for i in comparison[2].outline if not isinstance(i, list)]
+    for _, text in (comparison, verdict):
+        assert text.reader.trailer["/Root"]["/MarkInfo"]["/Marked"]
+    titles = [i.title for i in comparison[1].reader.outline if not isinstance(i, list)]
     assert titles[0] == "Comparison: metal, plastic"
 
 
@@ -194,7 +192,7 @@ def test_all_results_of_a_folder_make_chapters(tmp_path):
     write_result(tmp_path, records=1)
     (tmp_path / "posterior.nc").unlink()
     write_json(tmp_path / "verdict.json", told(assess([evidence("u")], Limits((Limit("peak_angle_rad", hi=1.0),)))))
-    text, _ = pages(tmp_path)
+    text = pages(tmp_path)
     overview = text[0]
     assert "ACCEPTED" in overview and "CONVERGED; 1 record" in overview and "structure not examined" in overview
     assert "Contents" in overview and "Key indicators" in overview and re.search(r"Results of \d+ [A-Z][a-z]+ \d{4}", overview)

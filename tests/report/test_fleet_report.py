@@ -1,7 +1,5 @@
 """The fleet's pages: what a reader must find on them, from a fleet made by hand."""
 
-import io
-
 import numpy as np
 import pytest
 from support.fleet_units import row
@@ -32,7 +30,7 @@ def made(shift=0.0, failures=3):
 
 
 def text_of(result, folder):
-    import pypdf
+    from support.pdf import Pages
 
     from backdrive_bayes.report.report import report_bytes
 
@@ -40,9 +38,15 @@ def text_of(result, folder):
     write_json(folder / "fleet.json", result)
     pdf = report_bytes([folder])
     assert pdf == report_bytes([folder])
-    reader = pypdf.PdfReader(io.BytesIO(pdf))
-    links = [a.get_object()["/A"].get("/URI") for page in reader.pages for a in page.get("/Annots") or []]
-    return " ".join(" ".join(page.extract_text() for page in reader.pages).split()), links
+    pages = Pages(pdf)
+    links = [a.get_object()["/A"].get("/URI") for page in pages.reader.pages for a in page.get("/Annots") or []]
+    return pages.text, links
+
+
+@pytest.fixture(scope="module")
+def steady(tmp_path_factory):
+    """The words and links of a fleet without drift."""
+    return text_of(made(), tmp_path_factory.mktemp("steady"))
 
 
 def test_a_shift_is_said_with_the_rate_of_false_alarms_and_where_it_begins(tmp_path):
@@ -51,19 +55,19 @@ def test_a_shift_is_said_with_the_rate_of_false_alarms_and_where_it_begins(tmp_p
     assert "from about unit-20 on" in text and "at most 1 % get an alarm" in text and "by chance 0.001" in text
 
 
-def test_a_fleet_without_drift_says_so(tmp_path):
-    text, _ = text_of(made(), tmp_path / "f")
+def test_a_fleet_without_drift_says_so(steady):
+    text, _ = steady
     assert "30 of 33 units have a result; no drift found" in text and "from about" not in text
 
 
-def test_units_to_look_at_lead_to_their_files(tmp_path):
-    text, links = text_of(made(), tmp_path / "f")
+def test_units_to_look_at_lead_to_their_files(steady):
+    text, links = steady
     assert links[:2] == ["units/key-9.json", "units/key-4.json"]
     assert "rejected, conforms with probability 0.020" in text and "sigma from the centre" in text
 
 
-def test_counts_batches_and_failures_are_told(tmp_path):
-    text, _ = text_of(made(), tmp_path / "f")
+def test_counts_batches_and_failures_are_told(steady):
+    text, _ = steady
     assert "accepted 29, rejected 1" in text and "none 29, thermal drift 1" in text
     assert "spring 20" in text and "autumn 10" in text and "Kruskal" in text
     assert "bad-2" in text and "expected a cycle, found none (2)" in text and "3 failed" in text

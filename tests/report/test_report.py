@@ -1,11 +1,10 @@
 """The PDF holds the numbers of the JSON, prints free text as it stands and is the same bytes again."""
 
-import io
 import json
 import re
 
-import pypdf
 import pytest
+from support.pdf import Pages
 from support_results import GROUP_ATTRIBUTES, indicators, write_result
 
 from backdrive_bayes.errors import BadInput, MissingExtra
@@ -20,22 +19,17 @@ ARCMIN = 10800 / 3.141592653589793
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """The object behind a report, its bytes and its reader."""
+    """The object behind a report, its bytes, its pages and its folder."""
     folder = tmp_path_factory.mktemp("fit")
     identity = {"material": "steel #eval(1)", "credit": "A. Author 2024", "license": "CC BY 4.0"}
     result = write_result(folder, records=2, unit=HOSTILE, identity=identity)
     data = report.report_bytes([folder])
-    return result, data, pypdf.PdfReader(io.BytesIO(data)), folder
-
-
-def text_of(reader, page=None):
-    pages = reader.pages if page is None else [reader.pages[page]]
-    return " ".join(" ".join(p.extract_text() for p in pages).split())
+    return result, data, Pages(data), folder
 
 
 def test_the_first_page_has_the_indicators_of_the_json(made):
-    result, _, reader, _ = made
-    page = text_of(reader, 0)
+    result, _, pages, _ = made
+    page = pages[0]
     factors = {"rad": ARCMIN, "J": 1e3, "ratio": 1.0}
     for record in result["records"]:
         for name, entry in record["indicators"].items():
@@ -48,21 +42,21 @@ def test_the_first_page_has_the_indicators_of_the_json(made):
             assert lo <= median <= hi
     assert "model error" not in page and "k = 0.03" in page and "90 %" in page
     digest = GROUP_ATTRIBUTES["data_sha256"]
-    assert f"{digest[:12]}…" in page and digest not in page and digest in text_of(reader)
+    assert f"{digest[:12]}…" in page and digest not in page and digest in pages.text
     assert "CONVERGED" in page and "INCONCLUSIVE" not in page
     assert "A. Author 2024" in page and "CC BY 4.0" in page
 
 
 def test_free_text_prints_as_it_stands(made):
-    _, _, reader, _ = made
-    assert HOSTILE in text_of(reader, 0)
-    assert "steel #eval(1)" in text_of(reader, 0)
-    assert HOSTILE in reader.metadata.title
-    assert HOSTILE in [item.title for item in reader.outline if not isinstance(item, list)]
+    pages = made[2]
+    assert HOSTILE in pages[0]
+    assert "steel #eval(1)" in pages[0]
+    assert HOSTILE in pages.reader.metadata.title
+    assert HOSTILE in [item.title for item in pages.reader.outline if not isinstance(item, list)]
 
 
 def test_metadata_tags_and_fonts(made):
-    _, data, reader, _ = made
+    reader = made[2].reader
     root = reader.trailer["/Root"]
     assert (
         root["/MarkInfo"]["/Marked"]
@@ -83,7 +77,7 @@ def test_metadata_tags_and_fonts(made):
 
 
 def test_details_name_seed_versions_priors_and_reconstructed_equations(made):
-    text = text_of(made[2])
+    text = made[2].text
     for needed in (
         "Seed 7",
         "numpy 2.0",
@@ -95,7 +89,7 @@ def test_details_name_seed_versions_priors_and_reconstructed_equations(made):
 
 
 def test_intervals_come_with_their_level(made):
-    text = text_of(made[2])
+    text = made[2].text
     assert "median and 90 % interval" in text and "median and interval" not in text
     for beneath in ("S", "τ₁: half the rise"):
         assert f"Median [90 % interval]. {beneath}" in text
@@ -103,7 +97,7 @@ def test_intervals_come_with_their_level(made):
 
 def test_parameters_stand_beside_the_implied_prior_with_their_meaning(made):
     about = made[0]["parameters"]["drag_torque_Nm"]
-    text = text_of(made[2])
+    text = made[2].text
     assert f"drag torque {interval_text(about, 1e3)} mN·m {interval_text(about['prior_interval'], 1e3)}" in text
     assert "drag torque: what drag_torque_Nm means" in text and "Implied prior, 90 %" in text
 
@@ -111,27 +105,27 @@ def test_parameters_stand_beside_the_implied_prior_with_their_meaning(made):
 def test_loads_are_shown_where_they_are_saved(tmp_path):
     result = write_result(tmp_path, records=1)
     (tmp_path / "posterior.nc").unlink()
-    assert "Loads that were asked for" not in folder_text(tmp_path)
+    assert "Loads that were asked for" not in pages_of(tmp_path).text
     angle, energy = ({"median": m, "lo": 0.9 * m, "hi": 1.1 * m} for m in (0.0728, 1.562e-3))
     load = {"load_Nm": 0.05, "loading_rate_Nm_per_s": 0.02, "theta_L_rad": angle, "W_L_J": energy, "predicted": []}
     result["loads"] = [load, load | {"load_Nm": 0.2, "predicted": ["load", "loading_rate"]}]
     over = {"median": 0.98, "lo": 0.95, "hi": 1.04}
     result["records"][0]["indicators"]["dissipation_ratio"] = over
     (tmp_path / "indicators.json").write_text(json.dumps(result))
-    text = folder_text(tmp_path)
+    text = pages_of(tmp_path).text
     shown = f"{interval_text(angle, ARCMIN)} {interval_text(energy, 1e3)}"
     assert f"0.0500 0.0200 {shown} no" in text and f"0.200 0.0200 {shown} load and rate" in text
     assert interval_text(over | {"hi": 1.0}) in text and "1.04" not in text, "the dissipation ratio ends at 1"
 
 
-def folder_text(folder):
-    return text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([folder]))))
+def pages_of(*folders):
+    return Pages(report.report_bytes(list(folders)))
 
 
 def test_figures_stay_text_and_vector(made):
-    reader = made[2]
-    assert "residual" in text_of(reader) and "settled loop, rising" in text_of(reader)
-    assert not any(page.images for page in reader.pages)
+    pages = made[2]
+    assert "residual" in pages.text and "settled loop, rising" in pages.text
+    assert not any(page.images for page in pages.reader.pages)
 
 
 def test_the_same_results_give_the_same_bytes(made):
@@ -142,7 +136,7 @@ def test_not_converged_is_inconclusive_with_advice(tmp_path):
     bad = indicators(1)["convergence"] | {"converged": False, "advice": "give it more time", "max_rhat": None}
     write_result(tmp_path, records=1, convergence=bad)
     (tmp_path / "posterior.nc").unlink()
-    page = text_of(pypdf.PdfReader(report.write_report([tmp_path], tmp_path / "out" / "r.pdf")), 0)
+    page = Pages(report.write_report([tmp_path], tmp_path / "out" / "r.pdf").read_bytes())[0]
     assert "INCONCLUSIVE" in page and "give it more time" in page and "Do not use" in page
     assert "provisional – not to be used" in page and "Signature" not in page
 
@@ -159,7 +153,7 @@ def test_what_the_check_found_and_was_overruled_stands_on_the_first_page(tmp_pat
     note = finding | {"level": "note", "text": "closes well"}
     write_result(tmp_path, records=1, findings=[finding, note], forced=True)
     (tmp_path / "posterior.nc").unlink()
-    page = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path]))), 0)
+    page = pages_of(tmp_path)[0]
     assert "FORCED: unfit data" in page and "warning, a.csv: the rated torque is 1000 times" in page and "closes well" not in page
     assert "Do not use these intervals: Forced" in page or "Do not use these intervals: forced" in page
     assert "PROVISIONAL" in page.upper() and "Signature" not in page
@@ -171,9 +165,9 @@ def test_the_summary_stays_on_one_page_whatever_the_unit_says(tmp_path):
         "cjk": "減速機",
     }
     write_result(tmp_path, records=3, unit="A" * 300, identity=identity)
-    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path])))
-    assert "Signature" in text_of(reader, 0) and "Module decomposition" in text_of(reader, 1)
-    assert r"a\u{0}b\u{1B}[31m\u{202E}c\u{E000}d" in text_of(reader, 0).replace("\u200b", "")
+    pages = pages_of(tmp_path)
+    assert "Signature" in pages[0] and "Module decomposition" in pages[1]
+    assert r"a\u{0}b\u{1B}[31m\u{202E}c\u{E000}d" in pages[0].replace("\u200b", "")
 
 
 def test_least_squares_stand_beside_the_posterior(tmp_path):
@@ -185,7 +179,7 @@ def test_least_squares_stand_beside_the_posterior(tmp_path):
     result = json.loads((tmp_path / "indicators.json").read_text()) | {"records": records}
     (tmp_path / "indicators.json").write_text(json.dumps(result))
     (tmp_path / "posterior.nc").unlink()
-    text = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path]))))
+    text = pages_of(tmp_path).text
     assert "0.3020 0.3630" in text and "0.9991" in text and "not defined" in text
 
 
@@ -193,10 +187,10 @@ def test_several_folders_make_one_report_with_a_summary_each(tmp_path):
     for name in ("a", "b"):
         write_result(tmp_path / name, records=1, unit=f"unit {name}")
         (tmp_path / name / "posterior.nc").unlink()
-    reader = pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path / "a", tmp_path / "b"])))
-    assert "unit a" in text_of(reader, 0) and "unit b" in text_of(reader, 0)
-    assert "unit a" in text_of(reader, 1) and "unit b" in text_of(reader, 2)
-    assert reader.metadata.title == "Backdrivability report: unit a, unit b"
+    pages = pages_of(tmp_path / "a", tmp_path / "b")
+    assert "unit a" in pages[0] and "unit b" in pages[0]
+    assert "unit a" in pages[1] and "unit b" in pages[2]
+    assert pages.reader.metadata.title == "Backdrivability report: unit a, unit b"
 
 
 def test_a_long_title_ends_with_a_whole_word(tmp_path):
@@ -204,7 +198,7 @@ def test_a_long_title_ends_with_a_whole_word(tmp_path):
     for name in names:
         write_result(tmp_path / name, records=1, unit=name)
         (tmp_path / name / "posterior.nc").unlink()
-    footer = text_of(pypdf.PdfReader(io.BytesIO(report.report_bytes([tmp_path / n for n in names]))), 0)
+    footer = pages_of(*(tmp_path / n for n in names))[0]
     whole = f"Backdrivability report: {', '.join(names)}"
     assert f"{whole[:88].rsplit(' ', 1)[0]}… page 1 of" in footer
     assert cut("one two three", 9) == "one two…" and cut("one two, three", 9) == "one two…" and cut("x" * 20, 9) == "x" * 8 + "…"

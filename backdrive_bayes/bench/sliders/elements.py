@@ -35,8 +35,17 @@ def sliders(torque_nm, half_width_nm):
 
     ``torque_nm`` has shape (steps,), ``half_width_nm`` (steps, elements): what a slider holds back.
     """
-    drive = torque_nm[:, None]
-    return drag_between(drive - half_width_nm, drive + half_width_nm, 0.0)
+    return _slide(np.asarray(torque_nm, float), np.ascontiguousarray(half_width_nm, float))
+
+
+@njit(cache=True)
+def _slide(torque_nm, half_width_nm):
+    moved, place = np.empty_like(half_width_nm), np.zeros(half_width_nm.shape[1])
+    for k in range(torque_nm.size):
+        for j in range(place.size):
+            place[j] = min(max(place[j], torque_nm[k] - half_width_nm[k, j]), torque_nm[k] + half_width_nm[k, j])
+            moved[k, j] = place[j]
+    return moved
 
 
 def gaps(torque_nm, drag_nm, centre_nm, rise_nm, fall_nm, start=0.0):
@@ -45,9 +54,21 @@ def gaps(torque_nm, drag_nm, centre_nm, rise_nm, fall_nm, start=0.0):
     A part crosses when the torque passes ``centre ± drag``, over a range ±``rise`` upwards and ±``fall`` downwards (film, tooth
     flexure); all [N·m], drag of shape (steps, elements), the others (elements,). ``start`` is where the parts float at first.
     """
-    drive = torque_nm[:, None] - centre_nm
-    lower, upper = (drive - drag_nm) / rise_nm, (drive + drag_nm) / fall_nm
-    return drag_between(np.clip(lower, -1.0, 1.0), np.clip(upper, -1.0, 1.0), start)
+    place = np.array(np.broadcast_to(start, centre_nm.shape), float)
+    return _cross(np.asarray(torque_nm, float), np.ascontiguousarray(drag_nm, float), centre_nm, rise_nm, fall_nm, place)
+
+
+@njit(cache=True)
+def _cross(torque_nm, drag_nm, centre_nm, rise_nm, fall_nm, place):
+    moved = np.empty_like(drag_nm)
+    for k in range(torque_nm.size):
+        for j in range(place.size):
+            drive = torque_nm[k] - centre_nm[j]
+            lower = min(max((drive - drag_nm[k, j]) / rise_nm[j], -1.0), 1.0)
+            upper = min(max((drive + drag_nm[k, j]) / fall_nm[j], -1.0), 1.0)
+            place[j] = min(max(place[j], lower), upper)
+            moved[k, j] = place[j]
+    return moved
 
 
 def stops(torque_nm, stop_nm, share):

@@ -48,7 +48,9 @@ class BenchReducer:
     def half_widths_nm(self, torque_nm):
         """What each slider holds back at these torques [N·m], shape (steps, elements)."""
         constant, load = slider_levels(self.spread)
-        return self.friction * self.rated_torque_nm * constant + self.load_friction * load * np.abs(torque_nm)[:, None]
+        held = self.load_friction * load * np.abs(torque_nm)[:, None]
+        held += self.friction * self.rated_torque_nm * constant
+        return held
 
     def transmitted_nm(self, torque_nm, half_width_nm):
         """Torque behind the sliders [N·m], shape (steps,)."""
