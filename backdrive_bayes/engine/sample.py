@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import emcee
 import numpy as np
 from emcee.moves import DEMove, Move
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import solve_triangular
 
 from backdrive_bayes.engine.diagnostics import Convergence, diagnose_draws
-from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, Whitened
+from backdrive_bayes.engine.marginal import LOG_SCALES, Known, Scales, Whitened
 
 ENSEMBLES = 4
 WALKERS = 32
@@ -18,9 +18,11 @@ DOF = 6.0
 """Degrees of freedom of the Student-t that proposes: heavier tails than the posterior's."""
 INFLATED = 1.1
 """Standard deviations of the proposal over those of the Laplace approximation."""
-WIDTHS = ((1.0, 0.7), (2.5, 0.3))
+WIDTHS = ((1.0, 0.9), (2.5, 0.1))
 """Widths of the two parts of the proposal, and their shares: a scale that the data do not need has a long lower tail."""
-FIRST_STEPS = 12
+INDEPENDENT = 0.85
+"""Share of independent proposals; the others are differences of walkers, which find what the first leave out."""
+FIRST_STEPS = 13
 MOST_STEPS = 384
 KEPT = 400
 """Draws kept of every ensemble."""
@@ -78,7 +80,7 @@ def sample(
     """
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
-    target = _Target(compressed, basis.group, scales, mode, free)
+    target = _Target(compressed, basis.group, scales, mode)
     move = _adapted(target, _Independence(mode[free], _laplace_root(target, mode[free])), seed)
     samplers, convergence = _ensembles(target, move, [names[i] for i in free], seed, note)
     drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
@@ -86,15 +88,8 @@ def sample(
     drawn, density = drawn[:, _thin(drawn)], density[:, _thin(drawn)]
     log_scale = np.broadcast_to(mode, (*drawn.shape[:2], mode.size)).copy()
     log_scale[..., free] = drawn
-    rng = np.random.default_rng([seed, ENSEMBLES])
-    flat = log_scale.reshape(-1, mode.size)
-    # Walkers that stay where they are share their log scales: one factorisation serves all their draws.
-    at, which = np.unique(flat, axis=0, return_inverse=True)
-    weights, coarse = np.empty((flat.shape[0], data.x.shape[1])), compressed.coarsened(power)
-    for k in range(at.shape[0]):
-        own = np.flatnonzero(which == k)
-        weights[own] = draw_weights(coarse, basis, at[k], own.size, rng)
-    weights = weights.reshape(*drawn.shape[:2], -1)
+    rng, flat = np.random.default_rng([seed, ENSEMBLES]), log_scale.reshape(-1, mode.size)
+    weights = draw_weights(compressed, basis, flat, ~scales.free, rng, power).reshape(*drawn.shape[:2], -1)
     acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
     return Draws(log_scale, weights, density, acceptance, convergence)
 
@@ -115,7 +110,7 @@ def _ensembles(target, move, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
     samplers = []
     for chain in range(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=[(move, 0.6), (DEMove(), 0.4)], vectorize=True)
+        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=[(move, INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)], vectorize=True)
         random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
         sampler.random_state = random.get_state()
         sampler.run_mcmc(move.draw(random, WALKERS), 4, skip_initial_state_check=True)
@@ -184,22 +179,25 @@ def compress(data: Whitened, scales: Scales, mode: np.ndarray) -> tuple[Whitened
     return Whitened(data.x @ basis.turn, data.y, data.samples, data.noise_dof), basis
 
 
-def draw_weights(data: Whitened, basis: Basis, log_scale, count: int, rng) -> np.ndarray:
-    """Exact draws (count, weights) of the weights given log scales."""
-    by_group = np.exp(np.clip(log_scale, *LOG_SCALES))
-    scale = by_group[basis.group]
-    inner = data.gram * np.outer(scale, scale)
-    inner[np.diag_indices_from(inner)] += 1.0
-    lower = cholesky(inner, lower=True, check_finite=False)
-    seen = solve_triangular(lower, scale * data.moment, lower=True, check_finite=False)
-    chi2 = max(data.total - float(seen @ seen), 0.0)
-    spread = np.sqrt((data.noise_dof + chi2) / rng.chisquare(data.noise_dof + data.samples, count))
+def draw_weights(data: Whitened, basis: Basis, log_scale, fixed, rng, power: float = 1.0) -> np.ndarray:
+    """Exact draws (draws, weights) of the weights given log scales (draws, scales), of which those ``fixed`` (scales,) are the
+    same in all draws; the likelihood is raised to ``power``."""
+    by_group = np.exp(np.clip(log_scale, *LOG_SCALES)).T
+    moments, held = data.moments.coarsened(power), fixed[basis.group]
+    known = Known.of(moments, held, by_group[basis.group[held], 0])
     # Drawn in the columns' own weights: signs and turns of principal directions must not change what a seed gives.
-    random = rng.standard_normal((basis.turn.shape[0], count))
-    noisy = seen[:, None] + spread * (basis.turn.T @ random)
-    standard = solve_triangular(lower, noisy, lower=True, trans=1, check_finite=False)
-    unseen = by_group[basis.rest_group, None] * (basis.rest.T @ random) * spread
-    return (basis.turn @ (scale[:, None] * standard) + basis.rest @ unseen).T
+    random = rng.standard_normal((basis.turn.shape[0], log_scale.shape[0]))
+    noise, spread = basis.turn.T @ random, np.empty(log_scale.shape[0])
+    free, chance = by_group[basis.group[~held]], rng.chisquare(moments.dof, spread.size)
+    # Walkers that stay where they are share their log scales: one factorisation serves all their draws.
+    places, which = np.unique(log_scale, axis=0, return_inverse=True)
+    for k in range(places.shape[0]):
+        own = np.flatnonzero(which == k)
+        free[:, own], spread[own] = known.left.draw(free[:, own[0]], noise[np.ix_(~held, own)], chance[own])
+    turned = np.empty(noise.shape)
+    turned[~held], turned[held] = free, known.given(free, noise[held] * spread)
+    unseen = by_group[basis.rest_group] * (basis.rest.T @ random) * spread
+    return (basis.turn @ turned + basis.rest @ unseen).T
 
 
 ADAPTED = 160
@@ -222,38 +220,43 @@ def _adapted(target, move, seed) -> _Independence:
     return move
 
 
+LAPLACE_STEP = 0.15
+"""Step of the difference quotients by a log scale."""
 OUTSIDE = -1e30
 """Log density beyond the range of log scales."""
+
+
+STACK = 16
+"""Points evaluated at once: more would not stay in the processor's cache."""
 
 
 class _Target:
     """Log posterior density of the free log scales, and how often it was evaluated."""
 
-    def __init__(self, data, group, scales, mode, free):
-        self.data, self.group, self.scales, self.mode, self.free = data, group, scales, mode, free
+    def __init__(self, data, group, scales, mode):
+        fixed = ~scales.free[group]
+        self.moments = Known.of(data.moments, fixed, np.exp(mode[group[fixed]])).left
+        self.group = (np.cumsum(scales.free) - 1)[group[~fixed]]
+        self.mean, self.sd = scales.mean[scales.free], scales.sd[scales.free]
         self.evaluations = 0
 
     def __call__(self, points):
-        return np.array([self.one(p) for p in np.atleast_2d(points)])
-
-    def one(self, point) -> float:
-        """Density at one point (free scales,)."""
-        self.evaluations += 1
-        if np.any(point < LOG_SCALES[0]) or np.any(point > LOG_SCALES[1]):
-            return OUTSIDE
-        log_scale = self.mode.copy()
-        log_scale[self.free] = point
-        return self.data.log_marginal(np.exp(log_scale)[self.group]) + self.scales.log_prior(log_scale)
+        """Densities (points,) at points (points, free scales)."""
+        points = np.atleast_2d(points)
+        self.evaluations += points.shape[0]
+        prior = -0.5 * np.sum(((points - self.mean) / self.sd) ** 2, axis=1)
+        scale = np.exp(np.clip(points, *LOG_SCALES))[:, self.group]
+        parts = [self.moments.log_marginal(scale[k : k + STACK]) for k in range(0, points.shape[0], STACK)]
+        inside = np.all((points >= LOG_SCALES[0]) & (points <= LOG_SCALES[1]), axis=1)
+        return np.where(inside, np.concatenate(parts) + prior, OUTSIDE)
 
 
 def _laplace_root(target, mode) -> np.ndarray:
     """Cholesky factor of the inverse Hessian at the mode, kept within the prior's width."""
-    size, step = mode.size, 0.15
-    hessian, unit = np.empty((size, size)), step * np.eye(size)
-    for i in range(size):
-        for j in range(i + 1):
-            ends = [target.one(mode + a * unit[i] + b * unit[j]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
-            hessian[i, j] = hessian[j, i] = -(ends[0] - ends[1] - ends[2] + ends[3]) / (4 * step**2)
+    rows, columns = np.tril_indices(mode.size)
+    unit, hessian = LAPLACE_STEP * np.eye(mode.size), np.empty((mode.size, mode.size))
+    ends = [target(mode + a * unit[rows] + b * unit[columns]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+    hessian[rows, columns] = hessian[columns, rows] = -(ends[0] - ends[1] - ends[2] + ends[3]) / (4 * LAPLACE_STEP**2)
     value, vector = np.linalg.eigh(hessian)
-    least = 1.0 / np.max(target.scales.sd) ** 2
+    least = 1.0 / np.max(target.sd) ** 2
     return INFLATED * np.linalg.cholesky((vector / np.maximum(value, least)) @ vector.T)
