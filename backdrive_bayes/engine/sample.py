@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import emcee
 import numpy as np
 from emcee.moves import DEMove, Move
+from scipy.interpolate import PchipInterpolator
 from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+from scipy.stats import t as student_t
 
 from backdrive_bayes.engine.diagnostics import Convergence, diagnose_draws
 from backdrive_bayes.engine.marginal import LOG_SCALES, Known, Scales, Whitened
 
 ENSEMBLES = 4
 WALKERS = 32
-DOF = 6.0
-"""Degrees of freedom of the Student-t that proposes: heavier tails than the posterior's."""
-INFLATED = 1.1
-"""Standard deviations of the proposal over those of the Laplace approximation."""
-WIDTHS = ((1.0, 0.9), (2.5, 0.1))
-"""Widths of the two parts of the proposal, and their shares: a scale that the data do not need has a long lower tail."""
-INDEPENDENT = 0.85
+SLICE = np.array([-7.0, -5.5, -4.5, -3.5, -2.5, -1.5, -0.5, 0.5, 1.5, 2.5, 3.5, 4.5, 6.0])
+"""Places, in standard deviations of the Laplace approximation, at which the density is sliced along each of its axes."""
+EDGES = np.linspace(SLICE[0], SLICE[-1], 401)
+"""Cells in which a slice has one density."""
+DOF, WIDE, FAR = 6.0, 1.5, 0.1
+"""Degrees of freedom and width of the Student-t that proposes beyond the slices, and its share."""
+INDEPENDENT = 0.9
 """Share of independent proposals; the others are differences of walkers, which find what the first leave out."""
-FIRST_STEPS = 13
+SETTLING, FIRST_STEPS = 2, 13
 MOST_STEPS = 384
 KEPT = 400
 """Draws kept of every ensemble."""
@@ -40,26 +43,33 @@ class Draws:
 
 
 class _Independence(Move):
-    """Proposes every walker anew from a mixture of a narrow and a wide Student-t (Metropolised independence)."""
+    """Proposes every walker anew (Metropolised independence): each axis of ``root`` has the density of the target's slice along
+    it through ``centre``, for posteriors of log scales are skewed; some points come from a wide Student-t."""
 
-    def __init__(self, mean, root):
-        self.mean, self.root = mean, root
+    def __init__(self, target, centre, root):
+        self.centre, self.root = centre, root
+        value = target((centre + SLICE[:, None, None] * root.T).reshape(-1, centre.size)).reshape(SLICE.size, -1)
+        middle = 0.5 * (EDGES[1:] + EDGES[:-1])
+        log = PchipInterpolator(SLICE, np.maximum(value - value.max(axis=0), LEAST_LOG))(middle)
+        self.log = log - logsumexp(log, axis=0)
+        self.share = np.vstack([np.zeros(centre.size), np.exp(self.log).cumsum(axis=0)])
 
     def log_density(self, x):
         """Log density up to a constant, (walkers,)."""
-        square = np.sum(solve_triangular(self.root, (x - self.mean).T, lower=True, check_finite=False) ** 2, axis=0)
-        size = self.mean.size
-        parts = [
-            np.log(share) - size * np.log(width) - 0.5 * (DOF + size) * np.log1p(square / (DOF * width**2))
-            for width, share in WIDTHS
-        ]
-        return np.logaddexp.reduce(parts, axis=0)
+        z = solve_triangular(self.root, (x - self.centre).T, lower=True, check_finite=False).T
+        cell = np.searchsorted(EDGES, z) - 1
+        inside = np.all((cell >= 0) & (cell < self.log.shape[0]), axis=1)
+        log = np.take_along_axis(self.log, np.clip(cell, 0, self.log.shape[0] - 1), axis=0) - np.log(EDGES[1] - EDGES[0])
+        sliced = np.where(inside, log.sum(axis=1), -np.inf)
+        wide = (student_t.logpdf(z / WIDE, DOF) - np.log(WIDE)).sum(axis=1)
+        return np.logaddexp(np.log(1.0 - FAR) + sliced, np.log(FAR) + wide)
 
     def draw(self, random, count):
         """Points (count, dimension)."""
-        width = np.where(random.random_sample(count) < WIDTHS[0][1], WIDTHS[0][0], WIDTHS[1][0])
-        scale = width * np.sqrt(DOF / random.chisquare(DOF, count))
-        return self.mean + (random.standard_normal((count, self.mean.size)) @ self.root.T) * scale[:, None]
+        chance = random.random_sample((count, self.centre.size))
+        sliced = np.stack([np.interp(c, share, EDGES) for c, share in zip(chance.T, self.share.T, strict=True)], axis=1)
+        wide = WIDE * random.standard_t(DOF, chance.shape)
+        return self.centre + np.where(random.random_sample((count, 1)) < FAR, wide, sliced) @ self.root.T
 
     def propose(self, model, state):
         """One step for all walkers; emcee's interface."""
@@ -81,7 +91,7 @@ def sample(
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
     target = _Target(compressed, basis.group, scales, mode)
-    move = _adapted(target, _Independence(mode[free], _laplace_root(target, mode[free])), seed)
+    move = _Independence(target, mode[free], _laplace_root(compressed, replace(scales, group=basis.group), mode))
     samplers, convergence = _ensembles(target, move, [names[i] for i in free], seed, note)
     drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
     density = np.stack([s.get_log_prob().ravel() for s in samplers])
@@ -100,7 +110,7 @@ def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: in
     ``target`` maps points (points, dimension) to log densities (points,) and counts its ``evaluations``; the first proposals
     are made about ``centre`` (dimension,) with the Cholesky factor ``root`` of their covariance.
     """
-    move = _adapted(target, _Independence(centre, root), seed)
+    move = _adapted(target, _Independence(target, centre, root), seed)
     samplers, convergence = _ensembles(target, move, names, seed, lambda text: None)
     drawn = np.stack([s.get_chain().reshape(-1, centre.size) for s in samplers])
     return drawn[:, _thin(drawn)], convergence
@@ -110,10 +120,11 @@ def _ensembles(target, move, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
     samplers = []
     for chain in range(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=[(move, INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)], vectorize=True)
+        moves = [(move, INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)]
+        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True)
         random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
         sampler.random_state = random.get_state()
-        sampler.run_mcmc(move.draw(random, WALKERS), 4, skip_initial_state_check=True)
+        sampler.run_mcmc(move.draw(random, WALKERS), SETTLING, skip_initial_state_check=True)
         sampler.reset()
         samplers.append(sampler)
     return samplers, _run(samplers, names, target, note)
@@ -201,11 +212,11 @@ def draw_weights(data: Whitened, basis: Basis, log_scale, fixed, rng, power: flo
 
 
 ADAPTED = 160
-"""Points from which the proposal is refitted, twice."""
+"""Points from which a proposal is refitted, twice."""
 
 
 def _adapted(target, move, seed) -> _Independence:
-    """The proposal refitted by importance sampling: the marginal posterior of log scales is skewed."""
+    """The proposal refitted by importance sampling, for a centre that is no mode."""
     random = np.random.RandomState(np.random.SeedSequence([seed, 99]).generate_state(4))
     for _ in range(2):
         new = move.draw(random, ADAPTED)
@@ -216,14 +227,12 @@ def _adapted(target, move, seed) -> _Independence:
         apart = new - mean
         covariance = (apart * weight[:, None]).T @ apart
         spread = np.diag(move.root @ move.root.T)
-        move = _Independence(mean, np.linalg.cholesky(covariance + 0.02 * np.diag(spread)))
+        move = _Independence(target, mean, np.linalg.cholesky(covariance + 0.02 * np.diag(spread)))
     return move
 
 
-LAPLACE_STEP = 0.15
-"""Step of the difference quotients by a log scale."""
-OUTSIDE = -1e30
-"""Log density beyond the range of log scales."""
+OUTSIDE, LEAST_LOG = -1e30, -50.0
+"""Log density beyond the range of log scales, and the least of a slice below its highest."""
 
 
 STACK = 16
@@ -251,12 +260,7 @@ class _Target:
         return np.where(inside, np.concatenate(parts) + prior, OUTSIDE)
 
 
-def _laplace_root(target, mode) -> np.ndarray:
-    """Cholesky factor of the inverse Hessian at the mode, kept within the prior's width."""
-    rows, columns = np.tril_indices(mode.size)
-    unit, hessian = LAPLACE_STEP * np.eye(mode.size), np.empty((mode.size, mode.size))
-    ends = [target(mode + a * unit[rows] + b * unit[columns]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
-    hessian[rows, columns] = hessian[columns, rows] = -(ends[0] - ends[1] - ends[2] + ends[3]) / (4 * LAPLACE_STEP**2)
-    value, vector = np.linalg.eigh(hessian)
-    least = 1.0 / np.max(target.sd) ** 2
-    return INFLATED * np.linalg.cholesky((vector / np.maximum(value, least)) @ vector.T)
+def _laplace_root(data, scales, mode) -> np.ndarray:
+    """Cholesky factor of the inverse Hessian of the free log scales at the mode, kept within the prior's width."""
+    value, vector = np.linalg.eigh(data.slopes(scales, mode)[2][np.ix_(scales.free, scales.free)])
+    return np.linalg.cholesky((vector / np.maximum(value, 1.0 / np.max(scales.sd) ** 2)) @ vector.T)

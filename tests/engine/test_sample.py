@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import gamma, norm
 
 from backdrive_bayes.engine import sample as engine
 from backdrive_bayes.engine.marginal import Moments, Scales, Whitened, find_scales
@@ -170,13 +170,31 @@ def test_signs_and_turns_of_principal_directions_change_no_draw():
 
 
 def test_the_move_proposes_from_its_own_density():
-    """The independence move's density is that of its points, up to a constant: a histogram against it in one dimension."""
-    move = engine._Independence(np.array([1.0]), np.array([[0.5]]))
+    """The independence move's density is that of its points, up to a constant: a histogram against it in one dimension. That of
+    a skewed target it follows, but for the share of the wide tails."""
+    target = gamma(4.0, scale=0.5)
+    move = engine._Independence(lambda x: np.maximum(target.logpdf(x[:, 0]), -700.0), np.array([1.5]), np.array([[0.5]]))
     points = move.draw(np.random.RandomState(0), 40_000)[:, 0]
-    edges = np.linspace(-0.5, 2.5, 25)
-    density = np.exp(move.log_density(0.5 * (edges[1:] + edges[:-1])[:, None]))
+    edges = np.linspace(-0.5, 4.5, 41)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    density = np.exp(move.log_density(middle[:, None]))
     counts = np.histogram(points, edges)[0]
     expected = density / density.sum() * counts.sum()
     assert np.all(np.abs(counts - expected) < 5 * np.sqrt(expected) + 0.02 * expected)
-    normal = norm(1.0, 0.5).pdf(0.5 * (edges[1:] + edges[:-1]))
-    assert np.any(np.abs(counts - normal / normal.sum() * counts.sum()) > 5 * np.sqrt(expected))
+    whole, normal = counts.sum() * 0.125, norm(2.0, 1.0)
+    assert np.abs(counts - whole * target.pdf(middle)).sum() < 0.2 * counts.sum()
+    assert np.abs(counts - whole * normal.pdf(middle)).sum() > 0.2 * counts.sum()
+
+
+def test_proposals_far_from_the_target_still_reach_it():
+    """Slices through the wrong place and of the wrong width."""
+    target = counted(lambda x: norm(3.0, 1.0).logpdf(x).sum(axis=1))
+    found, convergence = engine.sample_density(target, np.array([2.0, 4.0]), np.diag([0.4, 2.0]), ("a", "b"), 0)
+    assert convergence.converged
+    flat = found.reshape(-1, 2)
+    assert np.abs(flat.mean(axis=0) - 3.0).max() < 0.2 and np.abs(flat.std(axis=0) - 1.0).max() < 0.1
+
+
+def counted(density):
+    density.evaluations = 0
+    return density
