@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import emcee
 import numpy as np
@@ -91,7 +91,7 @@ def sample(
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
     target = _Target(compressed, basis.group, scales, mode)
-    move = _Independence(target, mode[free], _laplace_root(compressed, replace(scales, group=basis.group), mode))
+    move = _Independence(target, mode[free], _laplace_root(target, mode[free]))
     samplers, convergence = _ensembles(target, move, [names[i] for i in free], seed, note)
     drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
     density = np.stack([s.get_log_prob().ravel() for s in samplers])
@@ -231,6 +231,8 @@ def _adapted(target, move, seed) -> _Independence:
     return move
 
 
+LAPLACE_STEP = 0.15
+"""Step of the difference quotients by a log scale."""
 OUTSIDE, LEAST_LOG = -1e30, -50.0
 """Log density beyond the range of log scales, and the least of a slice below its highest."""
 
@@ -260,7 +262,11 @@ class _Target:
         return np.where(inside, np.concatenate(parts) + prior, OUTSIDE)
 
 
-def _laplace_root(data, scales, mode) -> np.ndarray:
-    """Cholesky factor of the inverse Hessian of the free log scales at the mode, kept within the prior's width."""
-    value, vector = np.linalg.eigh(data.slopes(scales, mode)[2][np.ix_(scales.free, scales.free)])
-    return np.linalg.cholesky((vector / np.maximum(value, 1.0 / np.max(scales.sd) ** 2)) @ vector.T)
+def _laplace_root(target, mode) -> np.ndarray:
+    """Cholesky factor of the inverse Hessian at the mode, kept within the prior's width."""
+    rows, columns = np.tril_indices(mode.size)
+    unit, hessian = LAPLACE_STEP * np.eye(mode.size), np.empty((mode.size, mode.size))
+    ends = [target(mode + a * unit[rows] + b * unit[columns]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+    hessian[rows, columns] = hessian[columns, rows] = -(ends[0] - ends[1] - ends[2] + ends[3]) / (4 * LAPLACE_STEP**2)
+    value, vector = np.linalg.eigh(hessian)
+    return np.linalg.cholesky((vector / np.maximum(value, 1.0 / np.max(target.sd) ** 2)) @ vector.T)

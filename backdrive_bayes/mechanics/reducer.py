@@ -113,8 +113,8 @@ class ReducerClass:
         return np.stack(list(columns), axis=1)
 
     def predict(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
-        """Block means of everything at independent ``weights`` by name, those of one record's initial state among them, (blocks,):
-        the sum of :meth:`columns` and :meth:`initial_columns` without making them."""
+        """Block means (blocks,) of the parts and of one record's initial state at independent ``weights`` by name: columns times
+        weights without making the columns."""
         angle = np.zeros(history.blocks)
         for part in self.parts:
             own, cells = part.weights(weights[part.name]), self._cells(part, growth)
