@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -94,9 +95,13 @@ class Design:
         return Design(self.groups + groups)
 
 
+_history = lru_cache(maxsize=16)(of_blocks)
+"""Histories of the distortion at hand are wanted again and again."""
+
+
 def histories(reduced: Reduced, distortion: Distortion) -> list[History]:
     """Torque histories of all records as the reducer felt them."""
-    return [of_blocks(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
+    return [_history(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
 
 
 def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, clearance_weights=None) -> Design:

@@ -97,7 +97,7 @@ class BlockMeans:
         return [local_slope(b, a, least * n.torque_nm) for b, a, n in zip(self.blocks, scaled, self.noise, strict=True)]
 
     @cached_property
-    def _still(self) -> list[tuple[np.ndarray, ...]]:
+    def _still(self) -> list[tuple]:
         """What no slope changes: the angle channel's covariance, distances of torques within legs and the torque not read."""
         found = []
         for blocks, noise in zip(self.blocks, self.noise, strict=True):

@@ -75,19 +75,24 @@ class Cells:
     def summed(self, history: History, weights, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
         """Block means times ``weights`` (cells,), (blocks,)."""
         share = np.concatenate([weights / self.norm, sign * weights / self.norm])
-        total = _summed(*_segments(history), *self._relays(history.start, state), share)
-        return total - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
+        arguments = *_segments(history), *self._relays(history.start, state), share
+        return _summed(*arguments) - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
+
+    @cached_property
+    def _both(self):
+        """Upper and lower switching torques and widths of all cells and then of their mirror images, and the clearances."""
+        up, down = (np.concatenate(p) for p in ((self.up, -self.down - self.width), (self.down, -self.up - self.width)))
+        return up, down, np.tile(self.width, 2), np.tile(self.clearance, 2)
 
     def _relays(self, start, state):
-        """Upper and lower switching torques, widths and first states of all cells and then of their mirror images."""
-        up, down = (np.concatenate(p) for p in ((self.up, -self.down - self.width), (self.down, -self.up - self.width)))
-        width = np.concatenate([self.width, self.width])
-        high, low = np.clip(start - down, 0.0, width), np.clip(start - up, 0.0, width)
+        """Switching torques, widths and first states of all relays."""
+        up, down, width, clearance = self._both
+        high, low = (np.minimum(np.maximum(start - edge, 0.0), width) for edge in (down, up))
         first = {"upper": high, "lower": low}.get(state)
         if first is None:
             # A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing from its noise.
-            at_rest = np.where(np.tile(self.clearance, 2), 0.5 * width, start - 0.5 * (up + down))
-            first = np.clip(np.clip(at_rest, 0.0, width), low, high)
+            at_rest = np.where(clearance, 0.5 * width, start - 0.5 * (up + down))
+            first = np.minimum(np.maximum(at_rest, low), high)
         return up, down, width, first
 
     def _paired(self, response, sign):

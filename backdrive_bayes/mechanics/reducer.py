@@ -107,9 +107,7 @@ class ReducerClass:
 
     def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
-        columns = (
-            _response(self._cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts
-        )
+        columns = (_response(self._cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
         return np.stack(list(columns), axis=1)
 
     def predict(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
