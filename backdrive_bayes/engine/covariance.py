@@ -17,9 +17,16 @@ SHORTEST_RUN = 1e-4
 def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0) -> np.ndarray:
     """Covariance of the block means of the angle [rad²], shape (blocks, blocks).
 
+    The torque path's error, of each block and of its leg as a whole, enters through ``slope_rad_per_nm`` (blocks,).
+    """
+    return channel_covariance(blocks, noise) + path_covariance(blocks, slope_rad_per_nm)
+
+
+def channel_covariance(blocks: Blocks, noise: NoiseEstimate) -> np.ndarray:
+    """The angle channel's part of it.
+
     The correlated part is the mean of σ² exp(-|t-t'|/t_c) over all pairs of samples of two blocks, as geometric sums; the white
-    part falls with the number of samples; the torque path's error, of each block and of its leg as a whole, enters through
-    ``slope_rad_per_nm`` (blocks,). A corrected mean carries part of its correction as error.
+    part falls with the number of samples. A corrected mean carries part of its correction as error.
     """
     n, span = blocks.count, blocks.end_s - blocks.begin_s
     # Samples some hundred correlation times apart are independent to the last bit.
@@ -32,9 +39,8 @@ def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0)
     np.fill_diagonal(matrix, (n + 2 * (n - total) / np.expm1(decay)) / n**2)
     matrix *= noise.correlated_rad**2
     white = noise.white_rad**2 / blocks.count
-    own = white + slope_rad_per_nm**2 * blocks.torque_variance_nm2 + (BEND_ERROR * blocks.bend_rad) ** 2
-    matrix[np.diag_indices_from(matrix)] += own
-    return matrix + _path_covariance(blocks, slope_rad_per_nm)
+    matrix[np.diag_indices_from(matrix)] += white + (BEND_ERROR * blocks.bend_rad) ** 2
+    return matrix
 
 
 def local_slope(blocks: Blocks, angle_rad, least_nm: float = 0.0) -> np.ndarray:
@@ -58,20 +64,22 @@ def local_slope(blocks: Blocks, angle_rad, least_nm: float = 0.0) -> np.ndarray:
     return slope
 
 
-def _path_covariance(blocks, slope):
-    """Error of the straight torque path through each leg, in level and tilt, seen through the slope; (blocks, blocks)."""
+def path_covariance(blocks: Blocks, slope_rad_per_nm) -> np.ndarray:
+    """Error of each block's torque and of the straight path through each leg, in level and tilt, seen through the slope
+    [rad²], (blocks, blocks)."""
+    slope = np.broadcast_to(slope_rad_per_nm, blocks.count.shape)
     size = slope * np.sqrt(blocks.torque_trend_nm2)
-    if np.ndim(size) == 0:
-        return 0.0
-    legs = np.arange(blocks.direction.size)
+    legs, number = np.unique(blocks.leg, return_inverse=True)
     middle, half = (
-        np.array([f(blocks.begin_s[blocks.leg == k][0], blocks.end_s[blocks.leg == k][-1]) for k in legs])[blocks.leg]
+        np.array([f(blocks.begin_s[blocks.leg == k][0], blocks.end_s[blocks.leg == k][-1]) for k in legs])[number]
         for f in (lambda a, b: 0.5 * (a + b), lambda a, b: 0.5 * (b - a))
     )
     along = (blocks.mid_s - middle) / half
     same = blocks.leg[:, None] == blocks.leg
     # Level and tilt of a line fitted to evenly spaced samples are independent; the tilt's share at the ends is three.
-    return same * np.outer(size, size) * (1 + 3 * np.outer(along, along))
+    matrix = same * np.outer(size, size) * (1 + 3 * np.outer(along, along))
+    matrix[np.diag_indices_from(matrix)] += slope**2 * blocks.torque_variance_nm2
+    return matrix
 
 
 def whitener(covariance: np.ndarray) -> np.ndarray:

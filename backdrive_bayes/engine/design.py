@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,6 +28,8 @@ STEP = 2e-5
 """Step of the difference quotients by offset and lag."""
 LEAST_LAW = 0.05
 """Range of a term of the rate's law, over the records, below which nothing is known of it."""
+OWN = ("initial", "floating")
+"""Groups of the class of which each record has weights of its own."""
 FLOATING_LOG_SCALE = (float(np.log(0.8)), 0.0)
 """A floating clearance lies anywhere between its flanks."""
 
@@ -92,9 +95,13 @@ class Design:
         return Design(self.groups + groups)
 
 
+_history = lru_cache(maxsize=16)(of_blocks)
+"""Histories of the distortion at hand are wanted again and again."""
+
+
 def histories(reduced: Reduced, distortion: Distortion) -> list[History]:
     """Torque histories of all records as the reducer felt them."""
-    return [of_blocks(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
+    return [_history(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
 
 
 def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, clearance_weights=None) -> Design:
@@ -106,7 +113,16 @@ def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion
         columns |= reducer.initial_columns(history, clearance_weights, growth)
         for name, column in columns.items():
             found.setdefault(name, []).append(column)
-    return Design(tuple(Group(n, tuple(c), n in ("initial", "floating")) for n, c in found.items()))
+    return Design(tuple(Group(n, tuple(c), n in OWN) for n, c in found.items()))
+
+
+def class_prediction(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, weights) -> list[np.ndarray]:
+    """The same times ``weights`` by group, the clearance's own where it floats, without the columns."""
+    found = []
+    for r, history in enumerate(histories(reduced, distortion)):
+        own = {n: np.split(w, len(reduced.blocks))[r] if n in OWN else w for n, w in weights.items()}
+        found.append(reducer.predict(history, own, distortion.growth(reduced.context.log_rate[r], reduced.context)))
+    return found
 
 
 def class_priors(reducer: ReducerClass) -> dict[str, tuple[float, float]]:
@@ -144,7 +160,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
                 groups.append(Group(effect.name, tuple(g[:, [effect.part]] * t for g, t in zip(grown, terms, strict=True))))
         elif isinstance(effect, TangentEffect):
             moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + STEP})
-            there = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
+            there = class_prediction(reduced, reducer, moved, weights)
             groups.append(Group(effect.name, tuple(((a - b) / STEP)[:, None] for a, b in zip(there, base, strict=True))))
     return tuple(groups)
 
@@ -165,6 +181,6 @@ def _spread(reduced, reducer, distortion, weights, base):
     found = [-b for b in base]
     for delay, share in zip(DELAYS, SHARES, strict=True):
         moved = replace(distortion, lag_s=delay * distortion.lag_s)
-        late = class_groups(reduced, reducer, moved, weights.get("clearance")).predict(weights)
+        late = class_prediction(reduced, reducer, moved, weights)
         found = [f + share * a for f, a in zip(found, late, strict=True)]
     return tuple(f[:, None] for f in found)

@@ -6,7 +6,8 @@ degrees of freedom, a flat offset for each record. X and y are whitened by C and
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -35,11 +36,88 @@ class Solution:
 
 
 @dataclass(frozen=True, eq=False)
+class Moments:
+    """Inner products of whitened columns and data, all that a solution needs, with the number of independent samples.
+
+    ``inner`` is (weights + 1, weights + 1), the data last.
+    """
+
+    inner: np.ndarray
+    samples: float
+    noise_dof: float
+
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom of the noise scale's posterior."""
+        return self.noise_dof + self.samples
+
+    def coarsened(self, power: float) -> Moments:
+        """The same with the likelihood raised to a power, as if there were fewer independent samples of the same noise."""
+        return Moments(self.inner * power, self.samples * power, self.noise_dof)
+
+    def log_marginal(self, scale) -> np.ndarray:
+        """Log marginal likelihoods (...) for standard deviations ``scale`` (..., weights), up to a constant."""
+        scale = np.concatenate([scale, np.ones((*np.shape(scale)[:-1], 1))], axis=-1)
+        matrix = self.inner * scale[..., :, None]
+        matrix *= scale[..., None, :]
+        number = np.arange(self.inner.shape[0])
+        matrix[..., number, number] += np.where(number < number[-1], 1.0, self.noise_dof)
+        # The data's own row of the factor ends in the root of what remains of them.
+        log = np.log(np.linalg.cholesky(matrix)[..., number, number])
+        return -self.dof * (log[..., -1] - 0.5 * np.log(self.noise_dof)) - log[..., :-1].sum(axis=-1)
+
+    def factor(self, scale) -> tuple[np.ndarray, np.ndarray, float]:
+        """Cholesky factor of the precision of the weights over ``scale`` (weights,), the data under it, and what remains of
+        them."""
+        inner = self.inner[:-1, :-1] * scale[:, None]
+        inner *= scale
+        inner[np.diag_indices_from(inner)] += 1.0
+        lower = cholesky(inner, lower=True, check_finite=False, overwrite_a=True)
+        seen = solve_triangular(lower, scale * self.inner[:-1, -1], lower=True, check_finite=False)
+        return lower, seen, max(float(self.inner[-1, -1] - seen @ seen), 0.0)
+
+    def draw(self, scale, noise, chance) -> tuple[np.ndarray, np.ndarray]:
+        """Weights (weights, draws) for standard normal ``noise`` (weights, draws) and the noise scales (draws,) for chi-square
+        ``chance`` (draws,) of ``dof`` degrees of freedom."""
+        lower, seen, chi2 = self.factor(scale)
+        spread = np.sqrt((self.noise_dof + chi2) / chance)
+        standard = solve_triangular(lower, seen[:, None] + spread * noise, lower=True, trans=1, check_finite=False)
+        return scale[:, None] * standard, spread
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Weights of known scale integrated exactly: ``left`` holds the moments of the others.
+
+    ``scale`` (known,), ``lower`` (known, known) is the factor of their precision and ``across`` (known, others + 1) what the
+    others and the data share with them.
+    """
+
+    scale: np.ndarray
+    lower: np.ndarray
+    across: np.ndarray
+    left: Moments
+
+    @classmethod
+    def of(cls, data: Moments, known, scale) -> Known:
+        """Integrate the weights ``known`` (weights,) with standard deviations ``scale`` (known,) out of ``data``."""
+        rest, rows = np.r_[~known, True], data.inner[:-1][known]
+        lower = np.linalg.cholesky(np.eye(scale.size) + rows[:, :-1][:, known] * np.outer(scale, scale))
+        across = solve_triangular(lower, scale[:, None] * rows[:, rest], lower=True, check_finite=False)
+        left = data.inner[np.ix_(rest, rest)] - across.T @ across
+        return cls(scale, lower, across, Moments(left, data.samples, data.noise_dof))
+
+    def given(self, others, noise) -> np.ndarray:
+        """Known weights (known, draws) for draws of the ``others`` (others, draws) and their own ``noise`` (known, draws)."""
+        seen = self.across[:, -1:] - self.across[:, :-1] @ others + noise
+        return self.scale[:, None] * solve_triangular(self.lower, seen, lower=True, trans=1, check_finite=False)
+
+
+@dataclass(frozen=True, eq=False)
 class Whitened:
     """Whitened columns ``x`` (samples, weights) and data ``y`` (samples,) with the number of independent samples.
 
-    ``log_volume`` is what the whitening itself adds to the log marginal likelihood. ``gram`` (weights, weights), ``moment``
-    (weights,) and ``total`` are the inner products of columns and data that every solution needs.
+    ``log_volume`` is what the whitening itself adds to the log marginal likelihood.
     """
 
     x: np.ndarray
@@ -47,41 +125,39 @@ class Whitened:
     samples: float
     noise_dof: float
     log_volume: float = 0.0
-    gram: np.ndarray = field(init=False)
-    moment: np.ndarray = field(init=False)
-    total: float = field(init=False)
 
-    def __post_init__(self):
-        object.__setattr__(self, "gram", self.x.T @ self.x)
-        object.__setattr__(self, "moment", self.x.T @ self.y)
-        object.__setattr__(self, "total", float(self.y @ self.y))
+    @cached_property
+    def moments(self) -> Moments:
+        """Inner products of columns and data."""
+        both = np.column_stack([self.x, self.y])
+        return Moments(both.T @ both, self.samples, self.noise_dof)
 
-    def coarsened(self, power: float) -> Whitened:
-        """The same with the likelihood raised to a power, as if there were fewer independent samples of the same noise."""
-        root = np.sqrt(power)
-        return Whitened(self.x * root, self.y * root, self.samples * power, self.noise_dof, self.log_volume)
+    @property
+    def gram(self) -> np.ndarray:
+        """Inner products of the columns, (weights, weights)."""
+        return self.moments.inner[:-1, :-1]
+
+    @property
+    def moment(self) -> np.ndarray:
+        """Inner products of the columns and the data, (weights,)."""
+        return self.moments.inner[:-1, -1]
+
+    @property
+    def total(self) -> float:
+        """Inner product of the data with themselves."""
+        return float(self.moments.inner[-1, -1])
+
+    def log_marginal(self, scale) -> np.ndarray:
+        """Log marginal likelihoods (...) for standard deviations ``scale`` (..., weights), up to a constant."""
+        return self.moments.log_marginal(scale)
 
     def solve(self, scale) -> Solution:
         """Posterior of the weights for standard deviations ``scale`` (weights,)."""
-        inner = self.gram * np.outer(scale, scale)
-        inner[np.diag_indices_from(inner)] += 1.0
-        lower = cholesky(inner, lower=True, check_finite=False)
-        seen = solve_triangular(lower, scale * self.moment, lower=True, check_finite=False)
-        inverse = dtrtri(lower, lower=1)[0]
-        chi2 = max(self.total - float(seen @ seen), 0.0)
-        root = scale[:, None] * inverse.T
-        dof = self.noise_dof + self.samples
+        lower, seen, chi2 = self.moments.factor(scale)
+        root = scale[:, None] * dtrtri(lower, lower=1)[0].T
+        dof = self.moments.dof
         log_marginal = -0.5 * dof * np.log1p(chi2 / self.noise_dof) - float(np.log(np.diag(lower)).sum())
         return Solution(root @ seen, root, chi2, (self.noise_dof + chi2) / dof, log_marginal)
-
-    def log_marginal(self, scale) -> float:
-        """Log marginal likelihood alone, up to a constant."""
-        inner = self.gram * np.outer(scale, scale)
-        inner[np.diag_indices_from(inner)] += 1.0
-        lower = cholesky(inner, lower=True, check_finite=False, overwrite_a=True)
-        seen = solve_triangular(lower, scale * self.moment, lower=True, check_finite=False)
-        chi2 = max(self.total - float(seen @ seen), 0.0)
-        return -0.5 * (self.noise_dof + self.samples) * np.log1p(chi2 / self.noise_dof) - float(np.log(np.diag(lower)).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,22 +192,20 @@ def find_scales(data: Whitened, scales: Scales, start=None, sweeps: int = SWEEPS
     Source: MacKay, Neural Computation 4, 1992, 415-447.
     """
     log_scale = np.array(scales.mean if start is None else start, float)
-    free = scales.free
-    solution = data.solve(scales.of_weights(log_scale))
-    count = np.bincount(scales.group, minlength=free.size)
+    free, group, dof = scales.free, scales.group, data.moments.dof
+    precision = np.where(free, 1.0 / np.where(free, scales.sd, 1.0) ** 2, 0.0)
+    count = np.bincount(group, minlength=free.size)
     for _ in range(sweeps):
-        scale = scales.of_weights(log_scale)
-        size = np.bincount(scales.group, (solution.mean / scale) ** 2, free.size) / solution.variance
-        left = np.bincount(scales.group, np.sum((solution.root / scale[:, None]) ** 2, axis=1), free.size)
-        learnt = count - left
-        precision = np.where(free, 1.0 / np.where(free, scales.sd, 1.0) ** 2, 0.0)
+        lower, seen, chi2 = data.moments.factor(scales.of_weights(log_scale))
+        inverse = dtrtri(lower, lower=1, overwrite_c=1)[0]
+        size = np.bincount(group, (seen @ inverse) ** 2, free.size) * dof / (data.noise_dof + chi2)
+        learnt = count - np.bincount(group, np.einsum("ij,ij->j", inverse, inverse), free.size)
         gradient = size - learnt - precision * (log_scale - scales.mean)
         step = np.where(free, np.clip(gradient / (size + learnt + precision + 1e-9), -1.0, 1.0), 0.0)
         log_scale = np.clip(log_scale + step, *LOG_SCALES)
-        solution = data.solve(scales.of_weights(log_scale))
         if np.abs(step).max() < 0.01:
             break
-    return log_scale, solution
+    return log_scale, data.solve(scales.of_weights(log_scale))
 
 
 def whiten(columns, angles, covariances, noise_dof: float, trust=None) -> Whitened:

@@ -27,14 +27,27 @@ NODES = 12
 
 def wave_group(linear: Linear, frequency: float | np.ndarray) -> Group:
     """Sine and cosine of the read angle at one frequency (or several, side by side)."""
-    columns = []
+    columns, frequencies = [], np.atleast_1d(frequency)
     share = (np.arange(NODES) + 0.5) / NODES
     for blocks, angle in zip(linear.reduced.blocks, linear.predicted, strict=True):
         time = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
-        phase = 2 * np.pi * np.interp(time, blocks.mid_s, angle)[:, :, None] * np.atleast_1d(frequency)
-        waves = np.stack([np.sin(phase).mean(axis=1), np.cos(phase).mean(axis=1)], axis=-1)
-        columns.append(waves.reshape(blocks.count.size, -1))
+        means = _mean_waves(2j * np.pi * np.interp(time, blocks.mid_s, angle), frequencies)
+        columns.append(np.stack([means.imag, means.real], axis=-1).reshape(blocks.count.size, -1))
     return Group("encoder_error", tuple(columns))
+
+
+def _mean_waves(turn, frequencies) -> np.ndarray:
+    """Means over nodes of exp(turn · frequency), (blocks, frequencies), for ``turn`` (blocks, nodes).
+
+    From one to the next of even frequencies a product does for the exponential.
+    """
+    means = np.empty((turn.shape[0], frequencies.size), complex)
+    steps = np.diff(frequencies, prepend=0.0)
+    wave = ahead = np.exp(turn * steps[-1])
+    for k, frequency in enumerate(frequencies):
+        wave = wave * ahead if k and abs(steps[k] - steps[-1]) < 1e-12 else np.exp(turn * frequency)
+        means[:, k] = wave.mean(axis=1)
+    return means
 
 
 def periodic_group(linear: Linear, frequency: float) -> Group:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from backdrive_bayes.engine.covariance import block_covariance, local_slope
+from backdrive_bayes.engine.covariance import channel_covariance, local_slope, path_covariance
 from backdrive_bayes.mechanics.effect import Context
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.lines import highest_line
@@ -97,15 +97,23 @@ class BlockMeans:
         scaled = (np.asarray(a) * self.angle_scale_rad for a in angles)
         return [local_slope(b, a, least * n.torque_nm) for b, a, n in zip(self.blocks, scaled, self.noise, strict=True)]
 
+    @cached_property
+    def _still(self) -> list[tuple]:
+        """What no slope changes: the angle channel's covariance, distances of torques within legs and the torque not read."""
+        found = []
+        for blocks, noise in zip(self.blocks, self.noise, strict=True):
+            apart = np.abs(blocks.torque_nm[:, None] - blocks.torque_nm) / self.torque_scale_nm
+            apart[blocks.leg[:, None] != blocks.leg] = np.inf
+            unread = (UNREAD * noise.torque_nm) ** 2 * np.exp(-apart / UNREAD_LENGTH)
+            found.append((channel_covariance(blocks, noise), apart, unread))
+        return found
+
     def covariances(self, slopes, jitter: Jitter) -> list[np.ndarray]:
         """Covariance of each record's block means in squared shares of the angle scale."""
         found = []
-        for blocks, noise, slope in zip(self.blocks, self.noise, slopes, strict=True):
-            matrix = block_covariance(blocks, noise, slope)
-            apart = np.abs(blocks.torque_nm[:, None] - blocks.torque_nm) / self.torque_scale_nm
-            wander = (jitter.torque * self.torque_scale_nm) ** 2 * np.exp(-apart / jitter.length)
-            wander += (UNREAD * noise.torque_nm) ** 2 * np.exp(-apart / UNREAD_LENGTH)
-            matrix += (blocks.leg[:, None] == blocks.leg) * np.outer(slope, slope) * wander
+        for blocks, slope, (channel, apart, unread) in zip(self.blocks, slopes, self._still, strict=True):
+            wander = unread + (jitter.torque * self.torque_scale_nm) ** 2 * np.exp(-apart / jitter.length)
+            matrix = channel + path_covariance(blocks, slope) + np.outer(slope, slope) * wander
             found.append(matrix / self.angle_scale_rad**2)
         return found
 

@@ -7,20 +7,25 @@ from dataclasses import dataclass
 import emcee
 import numpy as np
 from emcee.moves import DEMove, Move
-from scipy.linalg import cholesky, solve_triangular
+from scipy.interpolate import PchipInterpolator
+from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+from scipy.stats import t as student_t
 
 from backdrive_bayes.engine.diagnostics import Convergence, diagnose_draws
-from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, Whitened
+from backdrive_bayes.engine.marginal import LOG_SCALES, Known, Scales, Whitened
 
 ENSEMBLES = 4
 WALKERS = 32
-DOF = 6.0
-"""Degrees of freedom of the Student-t that proposes: heavier tails than the posterior's."""
-INFLATED = 1.1
-"""Standard deviations of the proposal over those of the Laplace approximation."""
-WIDTHS = ((1.0, 0.7), (2.5, 0.3))
-"""Widths of the two parts of the proposal, and their shares: a scale that the data do not need has a long lower tail."""
-FIRST_STEPS = 12
+SLICE = np.array([-7.0, -5.5, -4.5, -3.5, -2.5, -1.5, -0.5, 0.5, 1.5, 2.5, 3.5, 4.5, 6.0])
+"""Places, in standard deviations of the Laplace approximation, at which the density is sliced along each of its axes."""
+EDGES = np.linspace(SLICE[0], SLICE[-1], 401)
+"""Cells in which a slice has one density."""
+DOF, WIDE, FAR = 6.0, 1.5, 0.1
+"""Degrees of freedom and width of the Student-t that proposes beyond the slices, and its share."""
+INDEPENDENT = 0.9
+"""Share of independent proposals; the others are differences of walkers, which find what the first leave out."""
+SETTLING, FIRST_STEPS = 2, 13
 MOST_STEPS = 384
 KEPT = 400
 """Draws kept of every ensemble."""
@@ -38,26 +43,33 @@ class Draws:
 
 
 class _Independence(Move):
-    """Proposes every walker anew from a mixture of a narrow and a wide Student-t (Metropolised independence)."""
+    """Proposes every walker anew (Metropolised independence): each axis of ``root`` has the density of the target's slice along
+    it through ``centre``, for posteriors of log scales are skewed; some points come from a wide Student-t."""
 
-    def __init__(self, mean, root):
-        self.mean, self.root = mean, root
+    def __init__(self, target, centre, root):
+        self.centre, self.root = centre, root
+        value = target((centre + SLICE[:, None, None] * root.T).reshape(-1, centre.size)).reshape(SLICE.size, -1)
+        middle = 0.5 * (EDGES[1:] + EDGES[:-1])
+        log = PchipInterpolator(SLICE, np.maximum(value - value.max(axis=0), LEAST_LOG))(middle)
+        self.log = log - logsumexp(log, axis=0)
+        self.share = np.vstack([np.zeros(centre.size), np.exp(self.log).cumsum(axis=0)])
 
     def log_density(self, x):
         """Log density up to a constant, (walkers,)."""
-        square = np.sum(solve_triangular(self.root, (x - self.mean).T, lower=True, check_finite=False) ** 2, axis=0)
-        size = self.mean.size
-        parts = [
-            np.log(share) - size * np.log(width) - 0.5 * (DOF + size) * np.log1p(square / (DOF * width**2))
-            for width, share in WIDTHS
-        ]
-        return np.logaddexp.reduce(parts, axis=0)
+        z = solve_triangular(self.root, (x - self.centre).T, lower=True, check_finite=False).T
+        cell = np.searchsorted(EDGES, z) - 1
+        inside = np.all((cell >= 0) & (cell < self.log.shape[0]), axis=1)
+        log = np.take_along_axis(self.log, np.clip(cell, 0, self.log.shape[0] - 1), axis=0) - np.log(EDGES[1] - EDGES[0])
+        sliced = np.where(inside, log.sum(axis=1), -np.inf)
+        wide = (student_t.logpdf(z / WIDE, DOF) - np.log(WIDE)).sum(axis=1)
+        return np.logaddexp(np.log(1.0 - FAR) + sliced, np.log(FAR) + wide)
 
     def draw(self, random, count):
         """Points (count, dimension)."""
-        width = np.where(random.random_sample(count) < WIDTHS[0][1], WIDTHS[0][0], WIDTHS[1][0])
-        scale = width * np.sqrt(DOF / random.chisquare(DOF, count))
-        return self.mean + (random.standard_normal((count, self.mean.size)) @ self.root.T) * scale[:, None]
+        chance = random.random_sample((count, self.centre.size))
+        sliced = np.stack([np.interp(c, share, EDGES) for c, share in zip(chance.T, self.share.T, strict=True)], axis=1)
+        wide = WIDE * random.standard_t(DOF, chance.shape)
+        return self.centre + np.where(random.random_sample((count, 1)) < FAR, wide, sliced) @ self.root.T
 
     def propose(self, model, state):
         """One step for all walkers; emcee's interface."""
@@ -78,23 +90,16 @@ def sample(
     """
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
-    target = _Target(compressed, basis.group, scales, mode, free)
-    move = _adapted(target, _Independence(mode[free], _laplace_root(target, mode[free])), seed)
+    target = _Target(compressed, basis.group, scales, mode)
+    move = _Independence(target, mode[free], _laplace_root(target, mode[free]))
     samplers, convergence = _ensembles(target, move, [names[i] for i in free], seed, note)
     drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
     density = np.stack([s.get_log_prob().ravel() for s in samplers])
     drawn, density = drawn[:, _thin(drawn)], density[:, _thin(drawn)]
     log_scale = np.broadcast_to(mode, (*drawn.shape[:2], mode.size)).copy()
     log_scale[..., free] = drawn
-    rng = np.random.default_rng([seed, ENSEMBLES])
-    flat = log_scale.reshape(-1, mode.size)
-    # Walkers that stay where they are share their log scales: one factorisation serves all their draws.
-    at, which = np.unique(flat, axis=0, return_inverse=True)
-    weights, coarse = np.empty((flat.shape[0], data.x.shape[1])), compressed.coarsened(power)
-    for k in range(at.shape[0]):
-        own = np.flatnonzero(which == k)
-        weights[own] = draw_weights(coarse, basis, at[k], own.size, rng)
-    weights = weights.reshape(*drawn.shape[:2], -1)
+    rng, flat = np.random.default_rng([seed, ENSEMBLES]), log_scale.reshape(-1, mode.size)
+    weights = draw_weights(compressed, basis, flat, ~scales.free, rng, power).reshape(*drawn.shape[:2], -1)
     acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
     return Draws(log_scale, weights, density, acceptance, convergence)
 
@@ -105,7 +110,7 @@ def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: in
     ``target`` maps points (points, dimension) to log densities (points,) and counts its ``evaluations``; the first proposals
     are made about ``centre`` (dimension,) with the Cholesky factor ``root`` of their covariance.
     """
-    move = _adapted(target, _Independence(centre, root), seed)
+    move = _adapted(target, _Independence(target, centre, root), seed)
     samplers, convergence = _ensembles(target, move, names, seed, lambda text: None)
     drawn = np.stack([s.get_chain().reshape(-1, centre.size) for s in samplers])
     return drawn[:, _thin(drawn)], convergence
@@ -115,10 +120,11 @@ def _ensembles(target, move, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
     samplers = []
     for chain in range(ENSEMBLES):
-        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=[(move, 0.6), (DEMove(), 0.4)], vectorize=True)
+        moves = [(move, INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)]
+        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True)
         random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
         sampler.random_state = random.get_state()
-        sampler.run_mcmc(move.draw(random, WALKERS), 4, skip_initial_state_check=True)
+        sampler.run_mcmc(move.draw(random, WALKERS), SETTLING, skip_initial_state_check=True)
         sampler.reset()
         samplers.append(sampler)
     return samplers, _run(samplers, names, target, note)
@@ -184,30 +190,33 @@ def compress(data: Whitened, scales: Scales, mode: np.ndarray) -> tuple[Whitened
     return Whitened(data.x @ basis.turn, data.y, data.samples, data.noise_dof), basis
 
 
-def draw_weights(data: Whitened, basis: Basis, log_scale, count: int, rng) -> np.ndarray:
-    """Exact draws (count, weights) of the weights given log scales."""
-    by_group = np.exp(np.clip(log_scale, *LOG_SCALES))
-    scale = by_group[basis.group]
-    inner = data.gram * np.outer(scale, scale)
-    inner[np.diag_indices_from(inner)] += 1.0
-    lower = cholesky(inner, lower=True, check_finite=False)
-    seen = solve_triangular(lower, scale * data.moment, lower=True, check_finite=False)
-    chi2 = max(data.total - float(seen @ seen), 0.0)
-    spread = np.sqrt((data.noise_dof + chi2) / rng.chisquare(data.noise_dof + data.samples, count))
+def draw_weights(data: Whitened, basis: Basis, log_scale, fixed, rng, power: float = 1.0) -> np.ndarray:
+    """Exact draws (draws, weights) of the weights given log scales (draws, scales), of which those ``fixed`` (scales,) are the
+    same in all draws; the likelihood is raised to ``power``."""
+    by_group = np.exp(np.clip(log_scale, *LOG_SCALES)).T
+    moments, held = data.moments.coarsened(power), fixed[basis.group]
+    known = Known.of(moments, held, by_group[basis.group[held], 0])
     # Drawn in the columns' own weights: signs and turns of principal directions must not change what a seed gives.
-    random = rng.standard_normal((basis.turn.shape[0], count))
-    noisy = seen[:, None] + spread * (basis.turn.T @ random)
-    standard = solve_triangular(lower, noisy, lower=True, trans=1, check_finite=False)
-    unseen = by_group[basis.rest_group, None] * (basis.rest.T @ random) * spread
-    return (basis.turn @ (scale[:, None] * standard) + basis.rest @ unseen).T
+    random = rng.standard_normal((basis.turn.shape[0], log_scale.shape[0]))
+    noise, spread = basis.turn.T @ random, np.empty(log_scale.shape[0])
+    free, chance = by_group[basis.group[~held]], rng.chisquare(moments.dof, spread.size)
+    # Walkers that stay where they are share their log scales: one factorisation serves all their draws.
+    places, which = np.unique(log_scale, axis=0, return_inverse=True)
+    for k in range(places.shape[0]):
+        own = np.flatnonzero(which == k)
+        free[:, own], spread[own] = known.left.draw(free[:, own[0]], noise[np.ix_(~held, own)], chance[own])
+    turned = np.empty(noise.shape)
+    turned[~held], turned[held] = free, known.given(free, noise[held] * spread)
+    unseen = by_group[basis.rest_group] * (basis.rest.T @ random) * spread
+    return (basis.turn @ turned + basis.rest @ unseen).T
 
 
 ADAPTED = 160
-"""Points from which the proposal is refitted, twice."""
+"""Points from which a proposal is refitted, twice."""
 
 
 def _adapted(target, move, seed) -> _Independence:
-    """The proposal refitted by importance sampling: the marginal posterior of log scales is skewed."""
+    """The proposal refitted by importance sampling, for a centre that is no mode."""
     random = np.random.RandomState(np.random.SeedSequence([seed, 99]).generate_state(4))
     for _ in range(2):
         new = move.draw(random, ADAPTED)
@@ -218,42 +227,46 @@ def _adapted(target, move, seed) -> _Independence:
         apart = new - mean
         covariance = (apart * weight[:, None]).T @ apart
         spread = np.diag(move.root @ move.root.T)
-        move = _Independence(mean, np.linalg.cholesky(covariance + 0.02 * np.diag(spread)))
+        move = _Independence(target, mean, np.linalg.cholesky(covariance + 0.02 * np.diag(spread)))
     return move
 
 
-OUTSIDE = -1e30
-"""Log density beyond the range of log scales."""
+LAPLACE_STEP = 0.15
+"""Step of the difference quotients by a log scale."""
+OUTSIDE, LEAST_LOG = -1e30, -50.0
+"""Log density beyond the range of log scales, and the least of a slice below its highest."""
+
+
+STACK = 16
+"""Points evaluated at once: more would not stay in the processor's cache."""
 
 
 class _Target:
     """Log posterior density of the free log scales, and how often it was evaluated."""
 
-    def __init__(self, data, group, scales, mode, free):
-        self.data, self.group, self.scales, self.mode, self.free = data, group, scales, mode, free
+    def __init__(self, data, group, scales, mode):
+        fixed = ~scales.free[group]
+        self.moments = Known.of(data.moments, fixed, np.exp(mode[group[fixed]])).left
+        self.group = (np.cumsum(scales.free) - 1)[group[~fixed]]
+        self.mean, self.sd = scales.mean[scales.free], scales.sd[scales.free]
         self.evaluations = 0
 
     def __call__(self, points):
-        return np.array([self.one(p) for p in np.atleast_2d(points)])
-
-    def one(self, point) -> float:
-        """Density at one point (free scales,)."""
-        self.evaluations += 1
-        if np.any(point < LOG_SCALES[0]) or np.any(point > LOG_SCALES[1]):
-            return OUTSIDE
-        log_scale = self.mode.copy()
-        log_scale[self.free] = point
-        return self.data.log_marginal(np.exp(log_scale)[self.group]) + self.scales.log_prior(log_scale)
+        """Densities (points,) at points (points, free scales)."""
+        points = np.atleast_2d(points)
+        self.evaluations += points.shape[0]
+        prior = -0.5 * np.sum(((points - self.mean) / self.sd) ** 2, axis=1)
+        scale = np.exp(np.clip(points, *LOG_SCALES))[:, self.group]
+        parts = [self.moments.log_marginal(scale[k : k + STACK]) for k in range(0, points.shape[0], STACK)]
+        inside = np.all((points >= LOG_SCALES[0]) & (points <= LOG_SCALES[1]), axis=1)
+        return np.where(inside, np.concatenate(parts) + prior, OUTSIDE)
 
 
 def _laplace_root(target, mode) -> np.ndarray:
     """Cholesky factor of the inverse Hessian at the mode, kept within the prior's width."""
-    size, step = mode.size, 0.15
-    hessian, unit = np.empty((size, size)), step * np.eye(size)
-    for i in range(size):
-        for j in range(i + 1):
-            ends = [target.one(mode + a * unit[i] + b * unit[j]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
-            hessian[i, j] = hessian[j, i] = -(ends[0] - ends[1] - ends[2] + ends[3]) / (4 * step**2)
+    rows, columns = np.tril_indices(mode.size)
+    unit, hessian = LAPLACE_STEP * np.eye(mode.size), np.empty((mode.size, mode.size))
+    ends = [target(mode + a * unit[rows] + b * unit[columns]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+    hessian[rows, columns] = hessian[columns, rows] = -(ends[0] - ends[1] - ends[2] + ends[3]) / (4 * LAPLACE_STEP**2)
     value, vector = np.linalg.eigh(hessian)
-    least = 1.0 / np.max(target.scales.sd) ** 2
-    return INFLATED * np.linalg.cholesky((vector / np.maximum(value, least)) @ vector.T)
+    return np.linalg.cholesky((vector / np.maximum(value, 1.0 / np.max(target.sd) ** 2)) @ vector.T)

@@ -97,9 +97,8 @@ class ReducerClass:
                 columns.append(np.zeros(history.z1.size if ends else history.blocks))
                 continue
             more = tuple(g + GROWTH_STEP * (i == k) for i, g in enumerate(growth))
-            cells = (self._cells(part, g) for g in (more, growth))
-            there, here = (c.ends(history) if ends else c.means(history) for c in cells)
-            columns.append((there - here) @ part.weights(weights[name]) / GROWTH_STEP)
+            there, here = (_response(self._cells(part, g), history, part.weights(weights[name]), ends) for g in (more, growth))
+            columns.append((there - here) / GROWTH_STEP)
         return np.stack(columns, axis=1)
 
     def ends(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
@@ -108,12 +107,24 @@ class ReducerClass:
 
     def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
-        columns = []
+        columns = (_response(self._cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
+        return np.stack(list(columns), axis=1)
+
+    def predict(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
+        """Block means (blocks,) of the parts and of one record's initial state at independent ``weights`` by name: columns times
+        weights without making the columns."""
+        angle = np.zeros(history.blocks)
         for part in self.parts:
-            cells = self._cells(part, growth)
-            even = cells.ends(history, sign=-1.0) if ends else cells.means(history, sign=-1.0)
-            columns.append(even @ part.weights(weights[part.name]))
-        return np.stack(columns, axis=1)
+            own, cells = part.weights(weights[part.name]), self._cells(part, growth)
+            if part.name == "clearance":
+                moved = np.abs(own) * weights.get("floating", np.zeros(ZONES))[_zones(np.abs(own))]
+                angle, own = angle + cells.summed(history, moved, "upper"), own - moved
+            angle = angle + cells.summed(history, own)
+        if "initial" in weights:
+            plays, (upper, lower) = _initial_plays(), weights["initial"].reshape(2, -1)
+            angle = angle + plays.summed(history, upper, "upper") + plays.summed(history, lower, "lower")
+            angle = angle - plays.summed(history, upper + lower)
+        return angle
 
     def initial_columns(self, history: History, clearance_weights=None, growth=(0.0, 0.0)):
         """What a record's unknown initial state adds: columns of friction left up or down, and of clearance zones left up.
@@ -122,8 +133,7 @@ class ReducerClass:
         """
         found = {}
         if self.has("friction"):
-            r, one = np.array(INITIAL_THRESHOLDS), np.ones(len(INITIAL_THRESHOLDS))
-            plays = Cells(r - TOP, -r - TOP, 2 * TOP * one, 2 * one)
+            plays = _initial_plays()
             neutral, upper, lower = (plays.means(history, s) for s in ("neutral", "upper", "lower"))
             found["initial"] = np.hstack([upper - neutral, lower - neutral])
         if self.has("clearance"):
@@ -133,14 +143,29 @@ class ReducerClass:
             weights = (
                 np.abs(clearance_weights) if clearance_weights is not None else np.full(cells.count, np.exp(part.log_scale[0]))
             )
-            total = np.cumsum(weights)
-            zone = np.minimum(ZONES * (total - 0.5 * weights) / max(total[-1], 1e-300), ZONES - 1e-9).astype(int)
+            zone = _zones(weights)
             found["floating"] = np.stack([moved[:, zone == k] @ weights[zone == k] for k in range(ZONES)], axis=1)
         return found
 
     def _cells(self, part, growth):
         own = {"friction": growth[0], "clearance": growth[1]}.get(part.name, 0.0)
         return part.cells.wider(float(np.exp(own))) if own else part.cells
+
+
+def _response(cells, history, weights, ends, sign=1.0):
+    """Sum of the cells' responses times ``weights`` (cells,), block means or at the segments' ends."""
+    return cells.ends(history, sign=sign) @ weights if ends else cells.summed(history, weights, sign=sign)
+
+
+def _zones(weights) -> np.ndarray:
+    """Zone of each clearance cell, (cells,): each holds as much of the weights."""
+    total = np.cumsum(weights)
+    return np.minimum(ZONES * (total - 0.5 * weights) / max(total[-1], 1e-300), ZONES - 1e-9).astype(int)
+
+
+def _initial_plays() -> Cells:
+    r, one = np.array(INITIAL_THRESHOLDS), np.ones(len(INITIAL_THRESHOLDS))
+    return Cells(r - TOP, -r - TOP, 2 * TOP * one, 2 * one)
 
 
 def _elastic() -> Part:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import gamma, norm
 
 from backdrive_bayes.engine import sample as engine
-from backdrive_bayes.engine.marginal import Scales, Whitened, find_scales
+from backdrive_bayes.engine.marginal import Moments, Scales, Whitened, find_scales
 from backdrive_bayes.engine.sample import compress, draw_weights, sample
 
 
@@ -87,8 +87,8 @@ def test_chains_differ_from_one_another():
 
 def test_evaluations_are_counted(monkeypatch):
     calls = []
-    one = engine._Target.one
-    monkeypatch.setattr(engine._Target, "one", lambda self, p: calls.append(1) or one(self, p))
+    log_marginal = Moments.log_marginal
+    monkeypatch.setattr(Moments, "log_marginal", lambda self, scale: calls.extend(scale) or log_marginal(self, scale))
     notes = []
     found = drawn(notes=notes)[2]
     # The Laplace approximation's differences count as well.
@@ -111,6 +111,16 @@ def test_the_density_is_that_of_the_model_up_to_a_constant():
     np.testing.assert_allclose(away, away[0], atol=0.02)
 
 
+def test_scales_that_are_fixed_are_integrated_once_and_for_all():
+    data, scales = problem()
+    fixed = Scales(scales.group, scales.mean, np.array([0.0, 0.7]))
+    target = engine._Target(data, fixed.group, fixed, fixed.mean)
+    points = np.array([[-2.0], [0.5], [1.5]])
+    whole = [data.log_marginal(fixed.of_weights(np.r_[-0.5, p])) + fixed.log_prior(np.r_[-0.5, p]) for p in points]
+    assert np.diff(target(points)) == pytest.approx(np.diff(whole), abs=1e-9)
+    assert target(np.array([[99.0], [-99.0]])).max() <= engine.OUTSIDE and target.evaluations == 5
+
+
 def test_compressed_data_have_the_same_log_marginal_likelihood():
     """Sixty columns of which most are seen by no data."""
     rng = np.random.default_rng(2)
@@ -129,12 +139,13 @@ def test_compressed_data_have_the_same_log_marginal_likelihood():
     assert abs(lost - kept) > 0.01, "far above the mode directions count that were set apart"
 
 
-def test_unseen_directions_keep_their_prior():
+@pytest.mark.parametrize("fixed", [[False, False], [True, False], [False, True], [True, True]])
+def test_unseen_directions_keep_their_prior(fixed):
     data, scales = problem()
     blind = Whitened(np.hstack([data.x, np.zeros((24, 3))]), data.y, 24, 30.0)
     more = Scales(np.repeat([0, 1], [3, 6]), scales.mean, scales.sd)
     small, basis = compress(blind, more, more.mean)
-    weights = draw_weights(small, basis, np.array([-0.5, -1.0]), 20_000, np.random.default_rng(0))
+    weights = draw_weights(small, basis, np.tile(more.mean, (20_000, 1)), np.array(fixed), np.random.default_rng(0))
     solution = blind.solve(np.exp(more.mean)[more.group])
     dof = blind.noise_dof + blind.samples
     expected = solution.root @ solution.root.T * solution.variance * dof / (dof - 2)
@@ -153,18 +164,37 @@ def test_signs_and_turns_of_principal_directions_change_no_draw():
     sign, turn = rng.choice([-1.0, 1.0], basis.turn.shape[1]), np.linalg.qr(rng.standard_normal((4, 4)))[0]
     other = replace(basis, turn=basis.turn * sign, rest=basis.rest @ turn)
     flipped = Whitened(small.x * sign, small.y, small.samples, small.noise_dof)
-    here, there = (draw_weights(d, b, more.mean, 9, np.random.default_rng(0)) for d, b in ((small, basis), (flipped, other)))
+    at, free = np.tile(more.mean, (9, 1)), np.zeros(2, bool)
+    here, there = (draw_weights(d, b, at, free, np.random.default_rng(0)) for d, b in ((small, basis), (flipped, other)))
     np.testing.assert_allclose(there, here, atol=1e-12)
 
 
 def test_the_move_proposes_from_its_own_density():
-    """The independence move's density is that of its points, up to a constant: a histogram against it in one dimension."""
-    move = engine._Independence(np.array([1.0]), np.array([[0.5]]))
+    """The independence move's density is that of its points, up to a constant: a histogram against it in one dimension. That of
+    a skewed target it follows, but for the share of the wide tails."""
+    target = gamma(4.0, scale=0.5)
+    move = engine._Independence(lambda x: np.maximum(target.logpdf(x[:, 0]), -700.0), np.array([1.5]), np.array([[0.5]]))
     points = move.draw(np.random.RandomState(0), 40_000)[:, 0]
-    edges = np.linspace(-0.5, 2.5, 25)
-    density = np.exp(move.log_density(0.5 * (edges[1:] + edges[:-1])[:, None]))
+    edges = np.linspace(-0.5, 4.5, 41)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    density = np.exp(move.log_density(middle[:, None]))
     counts = np.histogram(points, edges)[0]
     expected = density / density.sum() * counts.sum()
     assert np.all(np.abs(counts - expected) < 5 * np.sqrt(expected) + 0.02 * expected)
-    normal = norm(1.0, 0.5).pdf(0.5 * (edges[1:] + edges[:-1]))
-    assert np.any(np.abs(counts - normal / normal.sum() * counts.sum()) > 5 * np.sqrt(expected))
+    whole, normal = counts.sum() * 0.125, norm(2.0, 1.0)
+    assert np.abs(counts - whole * target.pdf(middle)).sum() < 0.2 * counts.sum()
+    assert np.abs(counts - whole * normal.pdf(middle)).sum() > 0.2 * counts.sum()
+
+
+def test_proposals_far_from_the_target_still_reach_it():
+    """Slices through the wrong place and of the wrong width."""
+    target = counted(lambda x: norm(3.0, 1.0).logpdf(x).sum(axis=1))
+    found, convergence = engine.sample_density(target, np.array([2.0, 4.0]), np.diag([0.4, 2.0]), ("a", "b"), 0)
+    assert convergence.converged
+    flat = found.reshape(-1, 2)
+    assert np.abs(flat.mean(axis=0) - 3.0).max() < 0.2 and np.abs(flat.std(axis=0) - 1.0).max() < 0.1
+
+
+def counted(density):
+    density.evaluations = 0
+    return density
