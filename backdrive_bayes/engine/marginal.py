@@ -194,9 +194,11 @@ def find_scales(data: Whitened, scales: Scales, start=None, sweeps: int = SWEEPS
     log_scale = np.array(scales.mean if start is None else start, float)
     free, group, dof = scales.free, scales.group, data.moments.dof
     precision = np.where(free, 1.0 / np.where(free, scales.sd, 1.0) ** 2, 0.0)
+    held = ~free[group]
+    known, group = Known.of(data.moments, held, scales.of_weights(log_scale)[held]), group[~held]
     count = np.bincount(group, minlength=free.size)
     for _ in range(sweeps):
-        lower, seen, chi2 = data.moments.factor(scales.of_weights(log_scale))
+        lower, seen, chi2 = known.left.factor(scales.of_weights(log_scale)[~held])
         inverse = dtrtri(lower, lower=1, overwrite_c=1)[0]
         size = np.bincount(group, (seen @ inverse) ** 2, free.size) * dof / (data.noise_dof + chi2)
         learnt = count - np.bincount(group, np.einsum("ij,ij->j", inverse, inverse), free.size)
