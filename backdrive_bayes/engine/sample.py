@@ -9,7 +9,7 @@ import numpy as np
 from emcee.moves import DEMove, Move
 from scipy.interpolate import PchipInterpolator
 from scipy.linalg import solve_triangular
-from scipy.special import logsumexp
+from scipy.special import gammaln, logsumexp
 from scipy.stats import t as student_t
 
 from backdrive_bayes.engine.diagnostics import Convergence, diagnose_draws
@@ -21,10 +21,12 @@ SLICE = np.array([-7.0, -5.5, -4.5, -3.5, -2.5, -1.5, -0.5, 0.5, 1.5, 2.5, 3.5, 
 """Places, in standard deviations of the Laplace approximation, at which the density is sliced along each of its axes."""
 EDGES = np.linspace(SLICE[0], SLICE[-1], 401)
 """Cells in which a slice has one density."""
-DOF, WIDE, FAR = 6.0, 1.5, 0.1
+DOF, WIDE, FAR = 6.0, 1.2, 0.3
 """Degrees of freedom and width of the Student-t that proposes beyond the slices, and its share."""
 INDEPENDENT = 0.9
 """Share of independent proposals; the others are differences of walkers, which find what the first leave out."""
+KERNELS, LEARNT = 256, 3
+"""Kernels by which draws teach the proposal, and how often they do."""
 SETTLING, FIRST_STEPS = 2, 13
 MOST_STEPS = 384
 KEPT = 400
@@ -43,33 +45,33 @@ class Draws:
 
 
 class _Independence(Move):
-    """Proposes every walker anew (Metropolised independence): each axis of ``root`` has the density of the target's slice along
-    it through ``centre``, for posteriors of log scales are skewed; some points come from a wide Student-t."""
+    """Proposes every walker anew (Metropolised independence), in standard deviations of the Laplace approximation about
+    ``centre``: at first each axis of ``root`` has the density of the target's slice along it, for posteriors of log scales are
+    skewed; once that is found wanting, the density is learnt from draws. Some points come from a wide Student-t."""
 
     def __init__(self, target, centre, root):
         self.centre, self.root = centre, root
-        value = target((centre + SLICE[:, None, None] * root.T).reshape(-1, centre.size)).reshape(SLICE.size, -1)
-        middle = 0.5 * (EDGES[1:] + EDGES[:-1])
-        log = PchipInterpolator(SLICE, np.maximum(value - value.max(axis=0), LEAST_LOG))(middle)
-        self.log = log - logsumexp(log, axis=0)
-        self.share = np.vstack([np.zeros(centre.size), np.exp(self.log).cumsum(axis=0)])
+        self.shape = _Slices(target, centre, root)
+
+    def learn(self, draws):
+        """Take the place, the width and the shape of ``draws`` (draws, dimension) from now on."""
+        covariance = np.cov(draws, rowvar=False).reshape(self.root.shape)
+        self.centre, self.root = draws.mean(axis=0), np.linalg.cholesky(covariance + 1e-9 * np.diag(np.diag(covariance)))
+        self.shape = _Kernels(self._standard(draws))
+
+    def _standard(self, x):
+        return solve_triangular(self.root, (x - self.centre).T, lower=True, check_finite=False).T
 
     def log_density(self, x):
         """Log density up to a constant, (walkers,)."""
-        z = solve_triangular(self.root, (x - self.centre).T, lower=True, check_finite=False).T
-        cell = np.searchsorted(EDGES, z) - 1
-        inside = np.all((cell >= 0) & (cell < self.log.shape[0]), axis=1)
-        log = np.take_along_axis(self.log, np.clip(cell, 0, self.log.shape[0] - 1), axis=0) - np.log(EDGES[1] - EDGES[0])
-        sliced = np.where(inside, log.sum(axis=1), -np.inf)
+        z = self._standard(x)
         wide = (student_t.logpdf(z / WIDE, DOF) - np.log(WIDE)).sum(axis=1)
-        return np.logaddexp(np.log(1.0 - FAR) + sliced, np.log(FAR) + wide)
+        return np.logaddexp(np.log(1.0 - FAR) + self.shape.log_density(z), np.log(FAR) + wide)
 
     def draw(self, random, count):
         """Points (count, dimension)."""
-        chance = random.random_sample((count, self.centre.size))
-        sliced = np.stack([np.interp(c, share, EDGES) for c, share in zip(chance.T, self.share.T, strict=True)], axis=1)
-        wide = WIDE * random.standard_t(DOF, chance.shape)
-        return self.centre + np.where(random.random_sample((count, 1)) < FAR, wide, sliced) @ self.root.T
+        shaped, wide = self.shape.draw(random, count), WIDE * random.standard_t(DOF, (count, self.centre.size))
+        return self.centre + np.where(random.random_sample((count, 1)) < FAR, wide, shaped) @ self.root.T
 
     def propose(self, model, state):
         """One step for all walkers; emcee's interface."""
@@ -78,6 +80,47 @@ class _Independence(Move):
         ratio = log_prob - state.log_prob + self.log_density(state.coords) - self.log_density(new)
         accepted = np.log(model.random.random_sample(new.shape[0])) < ratio
         return self.update(state, emcee.State(new, log_prob=log_prob, blobs=blobs), accepted), accepted
+
+
+class _Slices:
+    """Product of the target's slices along the axes of ``root`` through ``centre``."""
+
+    def __init__(self, target, centre, root):
+        value = target((centre + SLICE[:, None, None] * root.T).reshape(-1, centre.size)).reshape(SLICE.size, -1)
+        middle = 0.5 * (EDGES[1:] + EDGES[:-1])
+        log = PchipInterpolator(SLICE, np.maximum(value - value.max(axis=0), LEAST_LOG))(middle)
+        self.log = log - logsumexp(log, axis=0)
+        self.share = np.vstack([np.zeros(centre.size), np.exp(self.log).cumsum(axis=0)])
+
+    def log_density(self, z):
+        cell = np.searchsorted(EDGES, z) - 1
+        inside = np.all((cell >= 0) & (cell < self.log.shape[0]), axis=1)
+        log = np.take_along_axis(self.log, np.clip(cell, 0, self.log.shape[0] - 1), axis=0) - np.log(EDGES[1] - EDGES[0])
+        return np.where(inside, log.sum(axis=1), -np.inf)
+
+    def draw(self, random, count):
+        chance = random.random_sample((count, self.share.shape[1]))
+        return np.stack([np.interp(c, share, EDGES) for c, share in zip(chance.T, self.share.T, strict=True)], axis=1)
+
+
+class _Kernels:
+    """Kernel density of standardised points (points, dimension): Student-t kernels of Silverman's width (Density Estimation, 1986, 4.3.2)."""
+
+    def __init__(self, points):
+        self.at = points[np.linspace(0, len(points) - 1, min(KERNELS, len(points))).astype(int)]
+        count, size = self.at.shape
+        self.width = (4.0 / (size + 2.0) / count) ** (1.0 / (size + 4.0))
+        constant = gammaln(0.5 * (DOF + size)) - gammaln(0.5 * DOF) - 0.5 * size * np.log(np.pi * DOF)
+        self.constant = constant - size * np.log(self.width) - np.log(count)
+
+    def log_density(self, z):
+        square = np.sum((z[:, None, :] - self.at) ** 2, axis=2) / self.width**2
+        return self.constant + logsumexp(-0.5 * (DOF + z.shape[1]) * np.log1p(square / DOF), axis=1)
+
+    def draw(self, random, count):
+        spread = self.width * np.sqrt(DOF / random.chisquare(DOF, (count, 1)))
+        at = self.at[random.randint(len(self.at), size=count)]
+        return at + spread * random.standard_normal(at.shape)
 
 
 def sample(
@@ -110,8 +153,7 @@ def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: in
     ``target`` maps points (points, dimension) to log densities (points,) and counts its ``evaluations``; the first proposals
     are made about ``centre`` (dimension,) with the Cholesky factor ``root`` of their covariance.
     """
-    move = _adapted(target, _Independence(target, centre, root), seed)
-    samplers, convergence = _ensembles(target, move, names, seed, lambda text: None)
+    samplers, convergence = _ensembles(target, _Independence(target, centre, root), names, seed, lambda text: None)
     drawn = np.stack([s.get_chain().reshape(-1, centre.size) for s in samplers])
     return drawn[:, _thin(drawn)], convergence
 
@@ -127,22 +169,29 @@ def _ensembles(target, move, names, seed, note):
         sampler.run_mcmc(move.draw(random, WALKERS), SETTLING, skip_initial_state_check=True)
         sampler.reset()
         samplers.append(sampler)
-    return samplers, _run(samplers, names, target, note)
+    return samplers, _run(samplers, move, names, target, note)
 
 
-def _run(samplers, names, target, note) -> Convergence:
-    steps = FIRST_STEPS
+def _run(samplers, move, names, target, note) -> Convergence:
+    steps, learnt = FIRST_STEPS, 0
     while True:
         for sampler in samplers:
             sampler.run_mcmc(None, steps, skip_initial_state_check=True)
         chains = [s.get_chain() for s in samplers]
         values = np.stack([c.transpose(1, 0, 2).reshape(-1, len(names)) for c in chains])
-        when = np.tile(np.arange(chains[0].shape[0]), WALKERS)
+        length = chains[0].shape[0]
+        when = np.tile(np.arange(length), WALKERS)
         convergence = diagnose_draws(names, values, np.stack([when] * len(samplers)), target.evaluations)
         note(f"{target.evaluations} evaluations: {convergence.line()}")
-        if convergence.converged or chains[0].shape[0] >= MOST_STEPS:
+        if convergence.converged or length >= MOST_STEPS:
             return convergence
-        steps = max(FIRST_STEPS, chains[0].shape[0] // 2)
+        steps = max(FIRST_STEPS, length // 2)
+        if learnt < LEARNT:
+            # Draws under one proposal teach the next, which must not count them.
+            move.learn(values.reshape(-1, len(names)))
+            steps, learnt = length + length // 2, learnt + 1
+            for sampler in samplers:
+                sampler.reset()
 
 
 def _thin(drawn):
@@ -209,26 +258,6 @@ def draw_weights(data: Whitened, basis: Basis, log_scale, fixed, rng, power: flo
     turned[~held], turned[held] = free, known.given(free, noise[held] * spread)
     unseen = by_group[basis.rest_group] * (basis.rest.T @ random) * spread
     return (basis.turn @ turned + basis.rest @ unseen).T
-
-
-ADAPTED = 160
-"""Points from which a proposal is refitted, twice."""
-
-
-def _adapted(target, move, seed) -> _Independence:
-    """The proposal refitted by importance sampling, for a centre that is no mode."""
-    random = np.random.RandomState(np.random.SeedSequence([seed, 99]).generate_state(4))
-    for _ in range(2):
-        new = move.draw(random, ADAPTED)
-        log_weight = target(new) - move.log_density(new)
-        weight = np.exp(0.5 * (log_weight - log_weight.max()))
-        weight /= weight.sum()
-        mean = weight @ new
-        apart = new - mean
-        covariance = (apart * weight[:, None]).T @ apart
-        spread = np.diag(move.root @ move.root.T)
-        move = _Independence(target, mean, np.linalg.cholesky(covariance + 0.02 * np.diag(spread)))
-    return move
 
 
 LAPLACE_STEP = 0.15
