@@ -23,9 +23,9 @@ EDGES = np.linspace(SLICE[0], SLICE[-1], 401)
 """Cells in which a slice has one density."""
 DOF, WIDE, FAR = 6.0, 1.2, 0.3
 """Degrees of freedom and width of the Student-t that proposes beyond the slices, and its share."""
-INDEPENDENT = 0.9
+INDEPENDENT = 0.6
 """Share of independent proposals; the others are differences of walkers, which find what the first leave out."""
-KERNELS, LEARNT = 256, 3
+KERNELS, LEARNT = 256, 9
 """Kernels by which draws teach the proposal, and how often they do."""
 SETTLING, FIRST_STEPS = 2, 13
 MOST_STEPS = 384
@@ -104,7 +104,10 @@ class _Slices:
 
 
 class _Kernels:
-    """Kernel density of standardised points (points, dimension): Student-t kernels of Silverman's width (Density Estimation, 1986, 4.3.2)."""
+    """Kernel density of standardised points (points, dimension): Student-t kernels of Silverman's width.
+
+    Source: Silverman, Density Estimation, 1986, section 4.3.2.
+    """
 
     def __init__(self, points):
         self.at = points[np.linspace(0, len(points) - 1, min(KERNELS, len(points))).astype(int)]
@@ -189,7 +192,7 @@ def _run(samplers, move, names, target, note) -> Convergence:
         if learnt < LEARNT:
             # Draws under one proposal teach the next, which must not count them.
             move.learn(values.reshape(-1, len(names)))
-            steps, learnt = length + length // 2, learnt + 1
+            steps, learnt = FIRST_STEPS + learnt, learnt + 1
             for sampler in samplers:
                 sampler.reset()
 
