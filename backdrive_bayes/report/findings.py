@@ -7,6 +7,8 @@ from backdrive_bayes.report.text import free
 
 MOST = 4
 """Warnings that a summary names."""
+PROVISIONAL = "? marks provisional numbers: not to be used."
+FORCED = "FORCED: the check finds the data unfit."
 _FORCED = "The check finds the data unfit and --force overruled it: nothing that rests on them is to be trusted."
 
 
