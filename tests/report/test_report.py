@@ -11,6 +11,7 @@ from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.number_text import interval_text, significant
 from backdrive_bayes.report import fit_section, report
 from backdrive_bayes.report.blocks import Note, Picture, Table
+from backdrive_bayes.report.findings import warned
 from backdrive_bayes.report.overview import overview_blocks
 from backdrive_bayes.report.text import cut, free, printable, typeset
 
@@ -158,6 +159,13 @@ def test_what_the_check_found_and_was_overruled_stands_on_the_first_page(tmp_pat
     assert "FORCED: unfit data" in page and "warning, a.csv: the rated torque is 1000 times" in page and "closes well" not in page
     assert "Do not use these intervals: Forced" in page or "Do not use these intervals: forced" in page
     assert "PROVISIONAL" in page.upper() and "Signature" not in page
+
+
+def test_errors_and_warnings_of_the_check_are_counted_apart():
+    levels = ["error", "warning", "warning", "note"]
+    told = [warned({"findings": [{"level": level} for level in levels[:n]]}) for n in range(5)]
+    assert told[:3] == ["", "1 error of the check", "1 error and 1 warning of the check"]
+    assert told[3] == told[4] == "1 error and 2 warnings of the check"
 
 
 def test_provisional_numbers_are_marked_beside_good_ones(tmp_path):
