@@ -99,6 +99,8 @@ def test_compare_with_claims(fits, tmp_path, capsys):
         (["accept", "{a}", "--limits", "{good}", "--level", "2"], "--level"),
         (["compare", "{a}"], "two units or more"),
         (["compare", "{a}", "{none}"], "nothing there"),
+        (["compare", "{a}", "{a}"], "units of different records, found the same records in"),
+        (["compare", "{b}", "{a}", "{gap}"], "units of different records, found the same records in"),
         (["compare", "{a}", "{b}", "--rope", "0"], "--rope"),
         (["compare", "{a}", "{b}", "--claims", "{none}"], "a claims file or 'paper'"),
     ],
@@ -112,7 +114,7 @@ def test_every_mistake_is_one_line_and_leaves_nothing(fits, tmp_path, capsys, ar
     }
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
-    names = {n: tmp_path / f"{n}.toml" for n in texts} | {"a": fits / "a", "b": fits / "b", "none": tmp_path / "none.toml"}
+    names = {n: tmp_path / f"{n}.toml" for n in texts} | {"a": fits / "a", "b": fits / "b", "gap": fits / "gap", "none": tmp_path / "none.toml"}
     out = tmp_path / "made" / "out"
     assert main([*(a.format(**names) for a in arguments), "-o", str(out)]) == 2
     error = capsys.readouterr().err
