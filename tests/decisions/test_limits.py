@@ -58,6 +58,7 @@ WRONG = {
     "no table": ("loop_area_J = 4e-4", "a table"),
     "impossible": ("[loop_area_J]\nmax = -1.0", "loop_area_J.max: expected a limit of 0 or more"),
     "impossible second": ("[[W_L_J]]\nmax = 1\n[[W_L_J]]\nmin = -2\nmax = -1", "cannot be negative, found -1"),
+    "absurd integer": (f"[loop_area_J]\nmax = {'9' * 5000}", "numbers of at most 300 digits, found a larger one"),
     "unknown key": ("[loop_area_J]\nmaximum = 4e-4", "one of min, max"),
     "missing rate": ("[loop_area_J]\nmax = 1\nat = {}", "loading_rate_Nm_per_s or amplitude_Nm"),
     "misspelt rate": ("[loop_area_J]\nmax = 1\nat = {rate = 0.05}", "one of loading_rate_Nm_per_s"),
