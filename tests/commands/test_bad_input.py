@@ -265,6 +265,18 @@ def test_check_ends_with_2_on_errors_and_writes_what_it_found(case, unit_folder,
     assert {"level": "error", "text": f"a.csv: {row['text']}"} in found["messages"]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [(["predict", "--help"], "angle with 90 % interval"), (["--help"], "angle with 90 % interval"),
+     (["report", "--help"], "or the PDF file itself"), (["fit", "--help"], "folder to write into")],
+)  # fmt: skip
+def test_help_prints_as_it_is_meant(arguments, told, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(arguments) == 0
+    said = capsys.readouterr().out
+    assert told in said and "%%" not in said
+
+
 LIMITS = "[loop_area_J]\nmax = 1.0\n"
 
 
