@@ -117,7 +117,8 @@ def test_every_mistake_is_one_line_and_leaves_nothing(fits, tmp_path, capsys, ar
     }
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
-    names = {n: tmp_path / f"{n}.toml" for n in texts} | {"a": fits / "a", "b": fits / "b", "gap": fits / "gap", "none": tmp_path / "none.toml"}
+    folders = {n: fits / n for n in ("a", "b", "gap")}
+    names = {n: tmp_path / f"{n}.toml" for n in texts} | folders | {"none": tmp_path / "none.toml"}
     out = tmp_path / "made" / "out"
     assert main([*(a.format(**names) for a in arguments), "-o", str(out)]) == 2
     error = capsys.readouterr().err
