@@ -31,6 +31,11 @@ def interval_text(interval: dict | None, factor: float = 1.0) -> str:
     return f"{_fixed(median, n)} [{_fixed(lo, n)}, {_fixed(hi, n)}]"
 
 
+def marked(text: str, provisional: bool) -> str:
+    """The text of an interval, "?" after its median where that is ``provisional``."""
+    return text.replace(" [", "? [", 1) if provisional else text
+
+
 def like_interval(value: float | None, interval: dict | None, factor: float = 1.0) -> str:
     """A single value with the decimals of the interval beside it."""
     if value is None:

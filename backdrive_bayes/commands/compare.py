@@ -74,6 +74,7 @@ def _evidences(args, options):
     # Whatever cannot be read is said before the first unit is sampled.
     force = getattr(args, "force", False)
     units = [Evidence.read(path) if is_result(path) else ready_unit(path, options.k, force) for path in args.units]
+    _require_own_records(args.units, units)
     evidences, made = [], {}
     for ready in units:
         if isinstance(ready, Evidence):
@@ -88,6 +89,15 @@ def _evidences(args, options):
         name = default_out(unit.name, "fit").name
         made[name if name not in made else f"{name}-{len(made) + 1}"] = posterior, result
     return evidences, made
+
+
+def _require_own_records(paths, units) -> None:
+    """BadInput where two results or units are of the same records: their draws are not independent."""
+    hashes = [u.unit.data_sha256 if hasattr(u, "unit") else u.about["data_sha256"] for u in units]
+    seen: dict = {}
+    for path, own in zip(paths, hashes, strict=True):
+        if (first := seen.setdefault(tuple(sorted(own)), path)) is not path:
+            raise BadInput("compare", "units of different records", f"the same records in '{first}' and '{path}'")
 
 
 def _summarise(result: dict, out: Path) -> None:

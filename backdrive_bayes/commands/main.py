@@ -97,10 +97,11 @@ def _parser(argv: list[str]) -> argparse.ArgumentParser:
     for verb in [asked] if asked in VERBS else VERBS:
         module = importlib.import_module(f"backdrive_bayes.commands.{VERBS[verb]}")
         own = verbs.add_parser(
-            verb, help=module.HELP.replace("%", "%%"), description=module.HELP.replace("%", "%%"), allow_abbrev=False
+            # argparse formats the one and not the other
+            verb, help=module.HELP.replace("%", "%%"), description=module.HELP, allow_abbrev=False
         )
         module.add_arguments(own)
-        own.add_argument("-o", "--out", type=Path, metavar="OUT", help="folder to write into")
+        own.add_argument("-o", "--out", type=Path, metavar="OUT", help=getattr(module, "OUT_HELP", "folder to write into"))
         own.add_argument("--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers (default 0)")
         own.set_defaults(run=module.run)
     return parser

@@ -7,6 +7,7 @@ from pathlib import Path
 from backdrive_bayes.errors import BadInput
 
 HELP = "make one PDF from result folders; computes nothing"
+OUT_HELP = "folder to write report.pdf into, or the PDF file itself"
 NAME = "report.pdf"
 
 

@@ -17,6 +17,8 @@ from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.results import CHECK, DIAGNOSIS, read_result, require_same_data
 
 BASELINE = "geometric,elastic,friction"
+HIGHEST_LEVEL = 0.99
+"""Level at which eight of a fit's draws lie beyond each end of an interval; fewer do not tell where an end is."""
 __all__ = ["FitOptions", "add_fit_arguments", "diagnose_unit", "draw_figures", "fit_unit", "is_result", "keep_fit", "ready_unit"]
 FIT_FILES = ("posterior.nc", "indicators.json")
 DIAGNOSIS_FIGURES = ("diagnosis", "gap-", "closed-fraction", "parameter-shift")
@@ -38,9 +40,11 @@ class FitOptions:
         known = BASELINE.split(",")
         if not set(self.baseline) <= set(known) or "elastic" not in self.baseline:
             raise BadInput("--baseline", f"modules out of {', '.join(known)}, elastic among them", ",".join(self.baseline))
-        for name, value in (("--k", self.k), ("--level", self.level)):
-            if not 0 < value < 1:
-                raise BadInput(name, "a number between 0 and 1", value)
+        if not 0 < self.k < 1:
+            raise BadInput("--k", "a number between 0 and 1", self.k)
+        if not 0 < self.level <= HIGHEST_LEVEL:
+            expected = f"a number above 0 and at most {HIGHEST_LEVEL:g}, beyond which too few draws lie"
+            raise BadInput("--level", expected, self.level)
         for load in self.loads:
             if not math.isfinite(load) or load == 0:
                 raise BadInput("--load", "a torque other than zero [N·m]", load)

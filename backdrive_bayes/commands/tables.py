@@ -7,7 +7,7 @@ import re
 
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.screen import Column, show_table, width
-from backdrive_bayes.number_text import interval_text, level_text, like_interval, probability_text
+from backdrive_bayes.number_text import interval_text, level_text, like_interval, marked, probability_text
 from backdrive_bayes.results import usable
 
 ARCMIN_PER_RAD = 10800.0 / math.pi
@@ -147,7 +147,7 @@ def _condition(row: dict) -> str:
 def _cell(interval: dict | None, factor: float = 1.0, provisional: bool = False) -> str:
     if interval is None:
         return "–"
-    text = interval_text(interval, factor).replace(" [", f"{'?' * provisional} [", 1)
+    text = marked(interval_text(interval, factor), provisional)
     return text if width() >= ONE_LINE else text.replace(" [", "\n[", 1)
 
 

@@ -10,9 +10,7 @@ import numpy as np
 MAX_RHAT = 1.01
 MIN_ESS = 400.0
 """A hundred for each of four chains, as Vehtari et al. recommend."""
-
-
-ADVICE = "not converged within the budget of evaluations: check the records, or leave out those that differ most from the others"
+ADVICE = "not converged within the budget of evaluations"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +45,21 @@ class Convergence:
         """Name of the quantity that mixes worst."""
         return self.names[int(np.nanargmin(np.minimum(self.bulk_ess, self.tail_ess)))]
 
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Each criterion that is not met, with the quantity that misses it by most."""
+        told, high = [], np.nan_to_num(self.rhat)
+        if not np.all(high < MAX_RHAT):
+            i = int(high.argmax())
+            value = f"R-hat {self.rhat[i]:.4f} of {self.names[i]} is not below {MAX_RHAT:g}"
+            told.append(value if np.isfinite(self.rhat[i]) else f"{self.names[i]} is not defined in all draws")
+        for kind, values in (("bulk", self.bulk_ess), ("tail", self.tail_ess)):
+            ess = np.where(np.isnan(self.rhat) | np.isnan(values), np.inf, values)
+            i = int(ess.argmin())
+            if ess[i] < MIN_ESS:
+                told.append(f"{kind} ESS {int(ess[i])} of {self.names[i]} is below {MIN_ESS:g}")
+        return tuple(told)
+
     def line(self) -> str:
         """One phrase for a log."""
         least = np.nanmin(np.minimum(self.bulk_ess, self.tail_ess))
@@ -61,7 +74,7 @@ class Convergence:
             "min_tail_ess": float(np.nanmin(self.tail_ess)),
             "evaluations": self.evaluations,
             "worst": self.worst,
-            "advice": "" if self.converged else ADVICE,
+            "advice": "" if self.converged else f"{ADVICE}: {', '.join(self.failed)}; check the records",
         }
 
 

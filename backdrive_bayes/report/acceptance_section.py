@@ -6,9 +6,9 @@ from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, verdict_figures
 from backdrive_bayes.figures.style import display_unit, indicator_words, words
-from backdrive_bayes.number_text import interval_text, level_text, like_interval, probability_text, significant
+from backdrive_bayes.number_text import interval_text, level_text, like_interval, marked, probability_text, significant
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
-from backdrive_bayes.report.findings import findings_blocks, warned
+from backdrive_bayes.report.findings import PROVISIONAL, findings_blocks, warned
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import digests, free
 from backdrive_bayes.results import VERDICT, read_result
@@ -59,8 +59,12 @@ def chapter(folder: Path) -> Chapter:
             _basis(verdict, in_full=not fitted),
         ],
         outcome=", ".join(filter(None, [_outcome(verdict), warned(verdict)])),
-        provisional=not verdict["convergence"]["converged"],
+        provisional=_provisional(verdict),
     )
+
+
+def _provisional(verdict):
+    return not verdict["convergence"]["converged"] or bool(verdict.get("forced"))
 
 
 def _outcome(verdict):
@@ -132,25 +136,26 @@ def _limits(verdict, at_most=None):
     left = len(verdict["limits"]) - len(rows)
     more = f" {left} further limits follow on the next pages." if left > 0 else ""
     lost = any(r["indicator"] == "lost_motion_rad" for r in rows)
+    marks = f" {PROVISIONAL}" * _provisional(verdict)
     at_k = f" δ is taken at ±kT_r with k = {verdict['k']:g}." if lost else ""
     return [
-        Table(columns, [_limit_cells(r) for r in rows], [1.3, 0, 1.05, 1.3, 1.25, 0.85, 0.9]),
+        Table(columns, [_limit_cells(r, _provisional(verdict)) for r in rows], [1.3, 0, 1.05, 1.3, 1.25, 0.85, 0.9]),
         Note(
             f"Median [{level_text(verdict['level'])} interval] of the reducer's own settled loop; p_c: conformance "
             f"probability, with the specific risks (consumer's if accepted / producer's if rejected).{at_k} "
             "Least squares: the classic evaluation's point estimate and where it lies; its branches do not "
-            f"close at ±T and friction hides in its offset, so that it may differ by more than the interval.{more}"
+            f"close at ±T and friction hides in its offset, so that it may differ by more than the interval.{marks}{more}"
         ),
     ]
 
 
-def _limit_cells(row):
+def _limit_cells(row, provisional):
     factor, unit = display_unit(row["unit"])
     return [
         [indicator_words(row["indicator"]), _at(row)],
         unit or "–",
         [_limit_text(row, factor), f"guard band {_guard(row, factor)}"],
-        interval_text(row, factor),
+        marked(interval_text(row, factor), provisional),
         [probability_text(row["conformance_probability"]), _risk_text(row)],
         row["verdict"],
         _classic(row, factor),

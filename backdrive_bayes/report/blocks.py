@@ -114,7 +114,7 @@ class Letterhead(Block):
 @dataclass(frozen=True)
 class About:
     """What the overview tells of a fitted unit: facts by name, and key indicators (name, unit, text) at one loop; ``data`` tells
-    units of one name apart.
+    units of one name apart. The numbers of a ``provisional`` unit are marked, one of ``forced`` data says so.
     """
 
     unit: str
@@ -122,6 +122,8 @@ class About:
     loop: str
     indicators: list[tuple[str, str, str]]
     data: str = ""
+    provisional: bool = False
+    forced: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, comparison_figures
 from backdrive_bayes.figures.style import indicator_words, shown_unit
-from backdrive_bayes.number_text import interval_text, level_text, probability_text
+from backdrive_bayes.number_text import interval_text, level_text, marked, probability_text
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.claims_section import claims
-from backdrive_bayes.report.findings import findings_blocks, warned
+from backdrive_bayes.report.findings import PROVISIONAL, findings_blocks, warned
 from backdrive_bayes.report.sentences import sentence
 from backdrive_bayes.report.text import Free, digests, free
 from backdrive_bayes.results import COMPARISON, read_result
@@ -79,9 +79,9 @@ def _banner(result):
 
 
 def _usable(result) -> set[str]:
-    """Names of the units whose sampling converged."""
+    """Names of the units whose sampling converged, on data that were not forced."""
     units = zip(result["names"], result["units"], strict=True)
-    return {name for name, unit in units if (unit.get("convergence") or {}).get("converged")}
+    return {n for n, unit in units if (unit.get("convergence") or {}).get("converged") and not unit.get("forced")}
 
 
 def _identity(result):
@@ -101,7 +101,8 @@ def _key_tables(result):
     ordered = sorted(result["pairs"], key=lambda p: not {p["first"], p["second"]} <= _usable(result))
     for pair in [p for p in ordered if p["conditions"]][:2]:
         best = min(pair["conditions"], key=_from_default)
-        blocks += [Heading(f"{free(pair['first'], 40)} and {free(pair['second'], 40)} at {_at(best)}"), _table(pair, best, KEY)]
+        heading = Heading(f"{free(pair['first'], 40)} and {free(pair['second'], 40)} at {_at(best)}")
+        blocks += [heading, _table(pair, best, KEY, _usable(result))]
     return [*blocks, Note(_legend(result))]
 
 
@@ -111,11 +112,12 @@ def _from_default(condition):
 
 
 def _legend(result):
+    marks = f" {PROVISIONAL}" if len(_usable(result)) < len(result["names"]) else ""
     return (
         f"Median [{level_text(result['level'])} interval]. Ratio: first over second; where not all draws of both are "
         "positive, the difference first minus second. “Greater” and “less” are said of the first, "
         f"where it differs by more than {100 * result['rope']:.3g} % with a probability of {100 * result['clear']:.3g} %. "
-        "P: the probability that the first is larger at all."
+        f"P: the probability that the first is larger at all.{marks}"
     )
 
 
@@ -123,17 +125,16 @@ def _at(condition):
     return f"{condition['loading_rate_Nm_per_s']:.2g} N·m/s, ±{condition['amplitude_Nm']:.2g} N·m"
 
 
-def _table(pair, condition, names):
-    rows = []
+def _table(pair, condition, names, usable):
+    rows, doubted = [], [pair[k] not in usable for k in ("first", "second")]
     for name in (n for n in names if n in condition["indicators"]):
         row = condition["indicators"][name]
         factor, unit = shown_unit(row["unit"], [row[k]["median"] for k in ("first", "second")])
         rows.append(
             [
                 f"{indicator_words(name)} [{unit or '–'}]",
-                interval_text(row["first"], factor),
-                interval_text(row["second"], factor),
-                _ratio_cell(row, factor, unit),
+                *(marked(interval_text(row[k], factor), d) for k, d in zip(("first", "second"), doubted, strict=True)),
+                _ratio_cell(row, factor, unit, any(doubted)),
                 probability_text(row["probability_first_greater"]),
                 row["verdict"],
             ]
@@ -142,11 +143,11 @@ def _table(pair, condition, names):
     return Table(columns, rows, [4.0, 3.16, 3.16, 3.62, 1.3, 1.76])
 
 
-def _ratio_cell(row, factor, unit):
+def _ratio_cell(row, factor, unit, provisional):
     """The ratio, or the difference where one of the two may be zero or change its sign."""
     if row["ratio"]:
-        return interval_text(row["ratio"])
-    return [interval_text(row["difference"], factor), f"difference [{unit or '–'}]"]
+        return marked(interval_text(row["ratio"]), provisional)
+    return [marked(interval_text(row["difference"], factor), provisional), f"difference [{unit or '–'}]"]
 
 
 def _refused(result):

@@ -7,6 +7,8 @@ from backdrive_bayes.report.text import free
 
 MOST = 4
 """Warnings that a summary names."""
+PROVISIONAL = "? marks provisional numbers: not to be used."
+FORCED = "FORCED: the check finds the data unfit."
 _FORCED = "The check finds the data unfit and --force overruled it: nothing that rests on them is to be trusted."
 
 
@@ -23,9 +25,11 @@ def findings_blocks(result: dict) -> list[Block]:
 
 def warned(result: dict) -> str:
     """The same in a few words for an overview; empty where there is nothing to say."""
-    count = sum(f.get("level") != "note" for f in result.get("findings") or [])
-    warnings = f"{count} warning{'s'[: count != 1]} of the check" if count else ""
-    return ", ".join(filter(None, ["FORCED on unfit data" if result.get("forced") else "", warnings]))
+    levels = [f.get("level") for f in result.get("findings") or []]
+    counts = [(levels.count(level), level) for level in ("error", "warning")]
+    found = " and ".join(f"{n} {level}{'s'[: n != 1]}" for n, level in counts if n)
+    forced = "FORCED on unfit data" if result.get("forced") else ""
+    return ", ".join(filter(None, [forced, f"{found} of the check" if found else ""]))
 
 
 def _line(finding):

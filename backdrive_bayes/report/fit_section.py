@@ -82,9 +82,10 @@ def _about(saved) -> About:
     record = saved.records[saved.main_record]
     identity = saved.indicators.get("identity") or {}
     told = [(k, str(identity[k])) for k in ON_OVERVIEW if identity.get(k)]
-    rows = [(name, unit, tables.indicator_text(key, record, factor)) for key, name, unit, factor in tables.INDICATORS]
+    provisional, forced = not usable(saved.indicators), bool(saved.indicators.get("forced"))
+    rows = [(n, unit, tables.indicator_text(key, record, factor, provisional)) for key, n, unit, factor in tables.INDICATORS]
     loop = f"{record['loading_rate_Nm_per_s']:.2g} N·m/s, ±{record['amplitude_Nm']:.2g} N·m"
-    return About(str(saved.indicators["unit"]), told, loop, rows, ",".join(saved.indicators["data_sha256"]))
+    return About(str(saved.indicators["unit"]), told, loop, rows, ",".join(saved.indicators["data_sha256"]), provisional, forced)
 
 
 ON_OVERVIEW = ("description", "serial", "bench", "operator", "test date", "test_date", "origin")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, parts, record_labels, shown_unit, words
-from backdrive_bayes.number_text import fixed, interval_text, level_text, significant
+from backdrive_bayes.number_text import fixed, interval_text, level_text, marked, significant
 from backdrive_bayes.report.blocks import Note, Table
+from backdrive_bayes.report.findings import FORCED, PROVISIONAL
 from backdrive_bayes.report.text import free
+from backdrive_bayes.results import usable
 
 INDICATORS = (
     ("lost_motion_rad", "Lost motion δ", "arcmin", ARCMIN_PER_RAD),
@@ -21,29 +23,30 @@ INDICATORS = (
 def indicators(saved, at_most: int | None = None) -> list:
     """Tables of the indicators, three records side by side."""
     records, labels = saved.records[:at_most], record_labels(saved.records)
-    level, k = level_text(saved.indicators["level"]), saved.indicators["k"]
+    level, k, provisional = level_text(saved.indicators["level"]), saved.indicators["k"], not usable(saved.indicators)
     blocks: list = []
     for part in parts(list(zip(labels, records, strict=False)), PER_FIGURE):
         rows = [
-            [name, unit, *(indicator_text(key, r, factor) for _, r in part)]
+            [name, unit, *(indicator_text(key, r, factor, provisional) for _, r in part)]
             for key, name, unit, factor in INDICATORS
         ]
         columns = ["Indicator", "Unit", *(label for label, _ in part)]
         blocks.append(Table(columns, rows, [1.6, 0, *[1.4] * len(part)]))
     left = len(saved.records) - len(records)
     more = f" {left} further records follow on the next pages." if left > 0 else ""
+    marks = f" {PROVISIONAL}" * provisional + f" {FORCED}" * bool(saved.indicators.get("forced"))
     blocks.append(
         Note(
-            f"Median [{level} interval] of the reducer's own settled loop. δ is taken at ±kT_r with k = {k:g}.{more}"
+            f"Median [{level} interval] of the reducer's own settled loop. δ is taken at ±kT_r with k = {k:g}.{marks}{more}"
         )
     )
     return blocks
 
 
-def indicator_text(key: str, record: dict, factor: float) -> str:
-    """An indicator's interval as text; a ratio of energies ends where it must."""
+def indicator_text(key: str, record: dict, factor: float, provisional: bool = False) -> str:
+    """An indicator's interval as text, marked where it is ``provisional``; a ratio of energies ends where it must."""
     found = record["indicators"].get(key)
-    return ratio_text(found) if key == "dissipation_ratio" else interval_text(found, factor)
+    return marked(ratio_text(found) if key == "dissipation_ratio" else interval_text(found, factor), provisional)
 
 
 def ratio_text(interval: dict | None) -> str:

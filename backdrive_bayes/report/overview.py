@@ -5,7 +5,8 @@ from __future__ import annotations
 from importlib.metadata import version
 
 from backdrive_bayes.report.blocks import Block, Chapter, Contents, Facts, Heading, Note, Table
-from backdrive_bayes.report.text import free
+from backdrive_bayes.report.findings import FORCED, PROVISIONAL
+from backdrive_bayes.report.text import Free, free
 
 MOST_UNITS = 3
 """Units beside each other in the table of key indicators."""
@@ -41,9 +42,10 @@ def _key_indicators(units) -> list[Block]:
     values = [{name: text for name, _, text in u.indicators} for u in units]
     rows = [[name, unit, *(v.get(name, "–") for v in values)] for name, unit, _ in units[0].indicators]
     loops = "; ".join(f"{free(u.unit, 24)}: {u.loop}" for u in units)
-    columns = ["Indicator", "Unit", *(free(u.unit, 24) for u in units)]
+    columns = ["Indicator", "Unit", *(Free(f"{free(u.unit, 24)}{', FORCED' * u.forced}") for u in units)]
+    marks = f" {PROVISIONAL}" * any(u.provisional for u in units) + f" {FORCED}" * any(u.forced for u in units)
     return [
         Heading("Key indicators"),
         Table(columns, rows, [1.6, 0, *[1.4] * len(units)]),
-        Note(f"Median and credible interval of the settled loop. {loops}."),
+        Note(f"Median and credible interval of the settled loop. {loops}.{marks}"),
     ]

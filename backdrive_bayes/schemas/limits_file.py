@@ -88,6 +88,9 @@ class LimitsFile(Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=
             raise BadInput("", "at least one limit, as in [lost_motion_rad] max = 0.003", "none")
         for name, tables in self.by_indicator():
             for table in tables:
+                # No indicator of a reducer is negative.
+                if table.max is not None and table.max < 0:
+                    raise BadInput(f"{name}.max", "a limit of 0 or more, as the quantity cannot be negative", f"{table.max:g}")
                 if table.k is not None and name != "lost_motion_rad":
                     raise BadInput(f"{name}.k", "k with lost_motion_rad only", f"{table.k:g}")
 

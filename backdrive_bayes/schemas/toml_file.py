@@ -42,9 +42,10 @@ def read_toml(path: Path, what: str, missing: str = "nothing there") -> dict[str
         raise
     except UnicodeDecodeError as error:
         raise BadInput(path, "text in UTF-8", f"another encoding (byte {error.start})") from error
-    # an integer of more than 4300 digits is a plain ValueError
-    except (ValueError, RecursionError) as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise BadInput(path, "valid TOML", str(error)[:200]) from error
+    except ValueError as error:  # an integer of more digits than Python converts
+        raise BadInput(path, "numbers of at most 300 digits", "a larger one") from error
     _refuse_absurd(path, table)
     return _dates_as_text(table)
 

@@ -123,7 +123,7 @@ CASES = {
     "not MDF": (renamed("mf4"), ["MDF file"]),
     "flipped bytes in MAT": (flipped_mat, ["MATLAB"]),
     "integer of 309 digits": (lambda f: edit_toml(f, "= 1.0", "= 1" + "0" * 308), ["at most 300 digits"]),
-    "integer of 5000 digits": (lambda f: edit_toml(f, "= 1.0", "= 1" + "0" * 5000), ["valid TOML"]),
+    "integer of 5000 digits": (lambda f: edit_toml(f, "= 1.0", "= 1" + "0" * 5000), ["at most 300 digits", "a larger one"]),
     "hexadecimal integer of 9000 digits": (lambda f: edit_toml(f, "= 1.0", "= 0x1" + "0" * 9000), ["at most 300 digits"]),
     "20 000 tables": (
         lambda f: edit_toml(f, "= 1.0", "= 1.0\n" + "[[loop_area_J]]\nmax = 1\n" * 20_000),
@@ -263,6 +263,18 @@ def test_check_ends_with_2_on_errors_and_writes_what_it_found(case, unit_folder,
     assert row["record"] == "a.csv" and not found["may_infer"]
     assert row["text"] in said.out and row["text"] in said.err and said.err.count("\n") == 1
     assert {"level": "error", "text": f"a.csv: {row['text']}"} in found["messages"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [(["predict", "--help"], "angle with 90 % interval"), (["--help"], "angle with 90 % interval"),
+     (["report", "--help"], "or the PDF file itself"), (["fit", "--help"], "folder to write into")],
+)  # fmt: skip
+def test_help_prints_as_it_is_meant(arguments, told, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(arguments) == 0
+    said = capsys.readouterr().out
+    assert told in said and "%%" not in said
 
 
 LIMITS = "[loop_area_J]\nmax = 1.0\n"

@@ -8,6 +8,8 @@ from support.decided import diagnosis, write_evidence
 from support.made_posterior import made_fit
 
 from backdrive_bayes.commands.main import main
+from backdrive_bayes.commands.results import HIGHEST_LEVEL, FitOptions
+from backdrive_bayes.engine import sample
 
 AREA = made_fit("a")[1]["records"][1]["indicators"]["loop_area_J"]["median"]
 
@@ -97,8 +99,11 @@ def test_compare_with_claims(fits, tmp_path, capsys):
         (["accept", "{a}", "--limits", "{good}", "--model", "{a}=1.5"], "leave some for UNIT"),
         (["accept", "{a}", "--limits", "{good}", "--batch", "{b}"], "at least 3 other units"),
         (["accept", "{a}", "--limits", "{good}", "--level", "2"], "--level"),
+        (["accept", "{a}", "--limits", "{good}", "--level", "0.999999"], "at most 0.99, beyond which too few draws lie"),
         (["compare", "{a}"], "two units or more"),
         (["compare", "{a}", "{none}"], "nothing there"),
+        (["compare", "{a}", "{a}"], "units of different records, found the same records in"),
+        (["compare", "{b}", "{a}", "{gap}"], "units of different records, found the same records in"),
         (["compare", "{a}", "{b}", "--rope", "0"], "--rope"),
         (["compare", "{a}", "{b}", "--claims", "{none}"], "a claims file or 'paper'"),
     ],
@@ -112,12 +117,18 @@ def test_every_mistake_is_one_line_and_leaves_nothing(fits, tmp_path, capsys, ar
     }
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
-    names = {n: tmp_path / f"{n}.toml" for n in texts} | {"a": fits / "a", "b": fits / "b", "none": tmp_path / "none.toml"}
+    folders = {n: fits / n for n in ("a", "b", "gap")}
+    names = {n: tmp_path / f"{n}.toml" for n in texts} | folders | {"none": tmp_path / "none.toml"}
     out = tmp_path / "made" / "out"
     assert main([*(a.format(**names) for a in arguments), "-o", str(out)]) == 2
     error = capsys.readouterr().err
     assert expected in error and error.count("\n") == 1 and "Traceback" not in error
     assert not list((tmp_path / "made").iterdir())
+
+
+def test_the_draws_of_a_fit_resolve_the_highest_level():
+    assert round(sample.ENSEMBLES * sample.KEPT * (1 - HIGHEST_LEVEL) / 2, 6) >= 8
+    assert FitOptions(level=HIGHEST_LEVEL).level == HIGHEST_LEVEL
 
 
 def test_a_limit_that_no_record_tells_of_is_said_before_sampling(unit_folder, tmp_path, capsys):

@@ -128,8 +128,8 @@ def test_a_diagnosis_of_the_same_data_is_taken(folder, tmp_path):
     ("changes", "expected"),
     [
         ({"unit": "other"}, "expected a result of unit u, as indicators.json has, found other"),
-        ({"data_sha256": ["f" * 64]}, "expected data with SHA-256 0123456789ab, .*found ffffffffffff"),
-        ({"data_sha256": []}, "expected data with SHA-256 0123456789ab, .*found none"),
+        ({"data_sha256": ["f" * 64]}, "expected data with SHA-256 0bfe935e70c3, .*found ffffffffffff"),
+        ({"data_sha256": []}, "expected data with SHA-256 0bfe935e70c3, .*found none"),
         ({"unit_sha256": "e" * 64}, "expected a unit file with SHA-256 none, .*found eeeeeeeeeeee"),
         ({"version": "0.0.1"}, "expected a result of version .*found 0.0.1"),
     ],

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from backdrive_bayes.engine.diagnostics import ADVICE, diagnose_draws
+from backdrive_bayes.engine.diagnostics import ADVICE, Convergence, diagnose_draws
 
 ENSEMBLES, WALKERS, STEPS = 4, 64, 15
 STEP = np.broadcast_to(np.tile(np.arange(STEPS), WALKERS), (ENSEMBLES, WALKERS * STEPS))
@@ -59,7 +59,26 @@ def test_trouble_is_flagged_and_named(trouble):
     assert not found.converged
     passing = (found.rhat < 1.01) & (found.bulk_ess >= 400) & (found.tail_ess >= 400)
     assert passing.tolist() == [True, False, True]
-    assert found.to_json()["advice"] == ADVICE
+    told = found.to_json()["advice"]
+    assert told.startswith(ADVICE) and "of q1 is" in told and "of q0" not in told and "of q2" not in told
+
+
+@pytest.mark.parametrize(
+    ("rhat", "bulk", "tail", "told"),
+    [
+        (1.004, 1152.0, 391.04, ("tail ESS 391 of friction is below 400",)),
+        (1.004, 399.9, 1000.0, ("bulk ESS 399 of friction is below 400",)),
+        (1.0213, 900.0, 900.0, ("R-hat 1.0213 of friction is not below 1.01",)),
+        (1.01, 300.0, 900.0, ("R-hat 1.0100 of friction is not below 1.01", "bulk ESS 300 of friction is below 400")),
+        (np.inf, np.nan, np.nan, ("friction is not defined in all draws",)),
+        (1.004, 900.0, 900.0, ()),
+    ],
+)
+def test_the_advice_names_the_criterion_that_failed(rhat, bulk, tail, told):
+    values = (np.array([good, bad, np.nan]) for good, bad in ((1.001, rhat), (2000.0, bulk), (2000.0, tail)))
+    found = Convergence(("elastic", "friction", "constant"), *values, 1)
+    assert found.failed == told and found.converged == (not told)
+    assert found.to_json()["advice"] == (f"{ADVICE}: {', '.join(told)}; check the records" if told else "")
 
 
 def test_worst_names_the_smallest_ess():

@@ -10,7 +10,9 @@ from support_results import GROUP_ATTRIBUTES, indicators, write_result
 from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.number_text import interval_text, significant
 from backdrive_bayes.report import fit_section, report
-from backdrive_bayes.report.blocks import Picture
+from backdrive_bayes.report.blocks import Note, Picture, Table
+from backdrive_bayes.report.findings import warned
+from backdrive_bayes.report.overview import overview_blocks
 from backdrive_bayes.report.text import cut, free, printable, typeset
 
 HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref //"
@@ -157,6 +159,31 @@ def test_what_the_check_found_and_was_overruled_stands_on_the_first_page(tmp_pat
     assert "FORCED: unfit data" in page and "warning, a.csv: the rated torque is 1000 times" in page and "closes well" not in page
     assert "Do not use these intervals: Forced" in page or "Do not use these intervals: forced" in page
     assert "PROVISIONAL" in page.upper() and "Signature" not in page
+
+
+def test_errors_and_warnings_of_the_check_are_counted_apart():
+    levels = ["error", "warning", "warning", "note"]
+    told = [warned({"findings": [{"level": level} for level in levels[:n]]}) for n in range(5)]
+    assert told[:3] == ["", "1 error of the check", "1 error and 1 warning of the check"]
+    assert told[3] == told[4] == "1 error and 2 warnings of the check"
+
+
+def test_provisional_numbers_are_marked_beside_good_ones(tmp_path):
+    bad = indicators(1)["convergence"] | {"converged": False, "advice": "give it more time"}
+    good, doubted, forced = (tmp_path / name for name in ("good", "doubted", "forced"))
+    entry = write_result(good, records=1, unit="good")["records"][0]["indicators"]["zero_torque_width_rad"]
+    write_result(doubted, records=1, unit="doubted", convergence=bad, data_sha256=["1" * 64])
+    write_result(forced, records=1, unit="forced", forced=True, data_sha256=["2" * 64])
+    abouts = [fit_section.chapter(folder).about for folder in (good, doubted, forced)]
+    blocks = overview_blocks([fit_section.chapter(folder) for folder in (good, doubted, forced)], "Report", "today")
+    plain, marked = (interval_text(entry, ARCMIN).replace(" [", f"{mark} [") for mark in ("", "?"))
+    table = next(b for b in blocks if isinstance(b, Table) and b.columns[0] == "Indicator")
+    assert [plain, marked, marked] in [row[2:] for row in table.rows]
+    assert table.columns[2:] == ["good", "doubted", "forced, FORCED"] and [a.forced for a in abouts] == [False, False, True]
+    assert any(isinstance(b, Note) and "? marks provisional numbers" in b.text for b in blocks)
+    (doubted / "posterior.nc").unlink()
+    page = pages_of(doubted)[0]
+    assert marked in page and "? marks provisional numbers" in page
 
 
 def test_the_summary_stays_on_one_page_whatever_the_unit_says(tmp_path):

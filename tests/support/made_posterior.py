@@ -2,6 +2,7 @@
 
 import copy
 from functools import lru_cache
+from hashlib import sha256
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def made_posterior(truth=None, loops=LOOPS, spread=0.01, seed=0, name="u", shape
     )  # fmt: skip
     return Posterior(
         unit_name=name,
-        data_hashes=("0123456789abcdef" * 4,),
+        data_hashes=(sha256(name.encode()).hexdigest(),),
         rated_torque_nm=truth.torque_scale_nm,
         reducer=truth.reducer,
         distortion=Distortion(),
