@@ -23,8 +23,9 @@ EDGES = np.linspace(SLICE[0], SLICE[-1], 401)
 """Cells in which a slice has one density."""
 DOF, WIDE, FAR = 6.0, 1.2, 0.3
 """Degrees of freedom and width of the Student-t that proposes beyond the slices, and its share."""
-INDEPENDENT = 0.6
-"""Share of independent proposals; the others are differences of walkers, which find what the first leave out."""
+INDEPENDENT = (0.9, 0.6)
+"""Share of independent proposals at first and once they learn; the others are differences of walkers, which find what the first
+leave out."""
 KERNELS, LEARNT = 256, 9
 """Kernels by which draws teach the proposal, and how often they do."""
 SETTLING, FIRST_STEPS = 2, 13
@@ -163,38 +164,35 @@ def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: in
 
 def _ensembles(target, move, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
-    samplers = []
+
+    def sampler(random_state, share):
+        moves = [(move, share), (DEMove(), 1.0 - share)]
+        made = emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True)
+        made.random_state = random_state
+        return made
+
+    samplers, starts, steps, learnt = [], [], FIRST_STEPS, 0
     for chain in range(ENSEMBLES):
-        moves = [(move, INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)]
-        sampler = emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True)
         random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
-        sampler.random_state = random.get_state()
-        sampler.run_mcmc(move.draw(random, WALKERS), SETTLING, skip_initial_state_check=True)
-        sampler.reset()
-        samplers.append(sampler)
-    return samplers, _run(samplers, move, names, target, note)
-
-
-def _run(samplers, move, names, target, note) -> Convergence:
-    steps, learnt = FIRST_STEPS, 0
+        samplers.append(sampler(random.get_state(), INDEPENDENT[0]))
+        starts.append(samplers[-1].run_mcmc(move.draw(random, WALKERS), SETTLING, skip_initial_state_check=True))
+        samplers[-1].reset()
     while True:
-        for sampler in samplers:
-            sampler.run_mcmc(None, steps, skip_initial_state_check=True)
+        starts = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, starts, strict=True)]
         chains = [s.get_chain() for s in samplers]
         values = np.stack([c.transpose(1, 0, 2).reshape(-1, len(names)) for c in chains])
         length = chains[0].shape[0]
         when = np.tile(np.arange(length), WALKERS)
-        convergence = diagnose_draws(names, values, np.stack([when] * len(samplers)), target.evaluations)
+        convergence = diagnose_draws(names, values, np.stack([when] * ENSEMBLES), target.evaluations)
         note(f"{target.evaluations} evaluations: {convergence.line()}")
         if convergence.converged or length >= MOST_STEPS:
-            return convergence
+            return samplers, convergence
         steps = max(FIRST_STEPS, length // 2)
         if learnt < LEARNT:
             # Draws under one proposal teach the next, which must not count them.
             move.learn(values.reshape(-1, len(names)))
             steps, learnt = FIRST_STEPS + learnt, learnt + 1
-            for sampler in samplers:
-                sampler.reset()
+            samplers = [sampler(s.random_state, INDEPENDENT[1]) for s in samplers]
 
 
 def _thin(drawn):
@@ -203,9 +201,8 @@ def _thin(drawn):
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """How compressed weights make the columns' own: ``turn`` (weights, compressed); ``rest`` (weights, left) are
-    directions that the
-    data do not see; ``group`` and ``rest_group`` number their scales."""
+    """How compressed weights make the columns' own: ``turn`` (weights, compressed); ``rest`` (weights, left) are directions that
+    the data do not see; ``group`` and ``rest_group`` number their scales."""
 
     turn: np.ndarray
     rest: np.ndarray
@@ -267,8 +264,6 @@ LAPLACE_STEP = 0.15
 """Step of the difference quotients by a log scale."""
 OUTSIDE, LEAST_LOG = -1e30, -50.0
 """Log density beyond the range of log scales, and the least of a slice below its highest."""
-
-
 STACK = 16
 """Points evaluated at once: more would not stay in the processor's cache."""
 
