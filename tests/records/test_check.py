@@ -85,6 +85,26 @@ def test_frozen_channel_speaks_against_inference():
     assert not result["may_infer"] and "stands still" in result["reason"]
 
 
+def test_a_run_that_noise_makes_impossible_is_a_warning_and_a_coarse_encoder_is_none():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    for quantum in (0.0, 0.1, 2.0):
+        coarse = np.round(angle / (quantum * ARCMIN)) * quantum * ARCMIN if quantum else angle.copy()
+        assert "stands still" not in texts(judged(time, torque, coarse, noise=0.0)[0], "warning")
+        if quantum < 1.0:
+            coarse[450:510] = coarse[450]
+            result, _ = judged(time, torque, coarse, noise=0.0)
+            assert "r.csv: angle stands still for 60 samples from sample 451 while torque passes" in texts(result, "warning")
+            assert result["may_infer"]
+
+
+def test_a_dwell_of_torque_and_angle_alike_is_no_fault_of_the_encoder():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    torque[450:550], angle[450:550] = torque[450], angle[450]
+    assert "stands still" not in texts(judged(time, torque, angle, noise=0.0)[0], "warning")
+
+
 def test_angle_lost_in_noise_speaks_against_inference():
     result, _ = judged(*ramps(noise=0.002), noise=500.0)
     assert not result["may_infer"] and "not clear of its noise" in result["reason"]
