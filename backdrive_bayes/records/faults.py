@@ -53,6 +53,15 @@ def without_wild(unit: Unit) -> Unit:
     return replace(unit, records=tuple(_without_wild(r) for r in unit.records))
 
 
+def with_wild_bridged(record: Record) -> Record:
+    """The record with straight lines in place of those samples: as many samples, so that their numbers stay those of the file."""
+    at = np.arange(len(record.time_s))
+    channels = {"torque_nm": record.torque_nm, "angle_rad": record.angle_rad}
+    wild = {name: find_wild(values, SPOILING_SHARE) for name, values in channels.items()}
+    kept = {name: np.interp(at, at[~wild[name]], values[~wild[name]]) for name, values in channels.items() if wild[name].any()}
+    return replace(record, **kept)
+
+
 def _without_wild(record: Record) -> Record:
     wild = find_wild(record.torque_nm, SPOILING_SHARE) | find_wild(record.angle_rad, SPOILING_SHARE)
     count = int(wild.sum())

@@ -76,6 +76,18 @@ def test_drop_outs_are_counted():
     assert "3 isolated torque samples" in texts(result, "warning")
 
 
+def test_one_wild_sample_changes_neither_signs_nor_jumps_nor_the_measured_loop():
+    time, torque = ramps(noise=0.002)
+    clean = judged(time, torque)[1]
+    for size in (5e3, 1e6):
+        spiky = answer(torque)
+        spiky[700] += size * ARCMIN
+        result, record = judged(time, torque, spiky)
+        assert result["may_infer"] and "1 isolated angle sample" in texts(result, "warning")
+        for name in ("loop_area_J", "zero_torque_width_rad"):
+            assert record["measured_loop"][name] == pytest.approx(clean["measured_loop"][name], rel=1e-3)
+
+
 def test_frozen_channel_speaks_against_inference():
     time, torque = ramps(noise=0.002)
     angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
