@@ -21,7 +21,7 @@ def judge_physics(found: dict, columns: dict[str, str]):
     """Findings of one record on its samples, cycles, signs and wraps."""
     yield from _samples(found)
     yield from _signs(found, columns)
-    yield from _jumps(found["angle_jumps"])
+    yield from _jumps(found["angle_jumps"], found["frozen"]["angle"])
     yield from _range(found)
     loop = found["measured_loop"]
     # A frozen channel draws loops of any direction and has a finding of its own.
@@ -105,7 +105,9 @@ def _turned(kind, columns) -> str:
     return f"{kind} = {mark}{turned}{mark}"
 
 
-def _jumps(jumps):
+def _jumps(jumps, frozen):
+    if stands_still(frozen):  # it jumps to where it ought to be when it is read again
+        return
     if jumps["against_motion"]:
         several = jumps["count"] > 1
         yield Finding(

@@ -97,6 +97,15 @@ def test_frozen_channel_speaks_against_inference():
     assert not result["may_infer"] and "stands still" in result["reason"]
 
 
+def test_a_frozen_channel_that_catches_up_is_not_taken_for_a_wrapping_encoder():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    angle[400:810] = angle[400]
+    result, record = judged(time, torque, angle, noise=0.0)
+    assert record["angle_jumps"]["against_motion"] == 1
+    assert "stands still" in texts(result, "error") and not texts(result, "warning")
+
+
 def test_a_run_that_noise_makes_impossible_is_a_warning_and_a_coarse_encoder_is_none():
     time, torque = ramps(noise=0.002)
     angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
