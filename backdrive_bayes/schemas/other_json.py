@@ -18,13 +18,14 @@ class History(Struct):
 
 
 class PredictionFile(Result, kw_only=True):
-    """prediction.json, beside prediction.csv: what it rests on."""
+    """prediction.json, beside prediction.csv: what it rests on; ``notes`` say what was guessed or mended in the history."""
 
     schema: Literal["backdrive-bayes/prediction/1"]
     unit: Text
     reason: str
     history: History
     posterior_sha256: Digest
+    notes: list[str] = field(default_factory=list)
 
 
 class Mark(Struct):

@@ -1,0 +1,36 @@
+"""`predict` says what it guessed and what its answer rests on, and leaves nothing of an older one."""
+
+import json
+
+import numpy as np
+import pytest
+from support.decided import write_evidence
+
+from backdrive_bayes.commands.main import main
+
+
+@pytest.fixture(scope="module")
+def posterior(tmp_path_factory):
+    return str(write_evidence(tmp_path_factory.mktemp("fit")) / "posterior.nc")
+
+
+@pytest.fixture
+def predicted(posterior, tmp_path, capsys):
+    """Predict a ramp 0 → T → 0 of so many seconds; returns prediction.json and the screen."""
+
+    def run(*options, largest=0.09, seconds=3.6, header="time_s,torque_Nm"):
+        path = tmp_path / "history.csv"
+        time = np.linspace(0, seconds, 101)
+        torque = np.interp(time, [0, 0.5 * seconds, seconds], [0, largest, 0])
+        np.savetxt(path, np.c_[time, torque], delimiter=",", header=header, comments="", encoding="utf-8")
+        assert main(["predict", posterior, str(path), "-o", str(tmp_path / "p"), *options]) == 0
+        return json.loads((tmp_path / "p" / "prediction.json").read_text()), capsys.readouterr().out
+
+    return run
+
+
+def test_guessed_columns_are_said_on_screen_and_in_the_file(predicted):
+    result, screen = predicted(largest=90.0, header="t [s],Drehmoment [mNm]")
+    said = "read 'Drehmoment [mNm]' as torque in mN·m"
+    assert said in screen and said in result["notes"]
+    assert predicted()[0]["notes"] == []
