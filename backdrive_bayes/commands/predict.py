@@ -56,6 +56,8 @@ def run(args) -> int:
             some = curves[np.linspace(0, len(curves) - 1, args.draws).astype(int)]
             names = ",".join(["time_s", "torque_Nm", *(f"angle_{i}_arcmin" for i in range(args.draws))])
             _write(folder / "draws.csv", names, time, measured, nodes(torque), some)
+        elif (out / "prediction.json").is_file():  # those of the prediction that is replaced
+            (out / "draws.csv").unlink(missing_ok=True)
         half = float(np.max(bounds[2] - bounds[1]) / 2)
         about = {"reason": f"{time.size} points, half-width at most {half:.3g}′", "notes": notes}
         result = _sidecar(args, posterior, about)

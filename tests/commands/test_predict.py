@@ -34,3 +34,15 @@ def test_guessed_columns_are_said_on_screen_and_in_the_file(predicted):
     said = "read 'Drehmoment [mNm]' as torque in mN·m"
     assert said in screen and said in result["notes"]
     assert predicted()[0]["notes"] == []
+
+
+def test_draws_of_an_older_prediction_go_and_a_stranger_s_file_stays(predicted, tmp_path):
+    drawn = tmp_path / "p" / "draws.csv"
+    drawn.parent.mkdir()
+    drawn.write_text("mine")
+    predicted()
+    assert drawn.read_text() == "mine"
+    predicted("--draws", "3")
+    assert "angle_2_arcmin" in drawn.read_text()
+    predicted()
+    assert not drawn.exists()
