@@ -33,7 +33,7 @@ def run(args) -> int:
     import numpy as np
 
     from backdrive_bayes.engine.posterior_read import read_posterior
-    from backdrive_bayes.engine.prediction import nodes, predict_angles, require_range
+    from backdrive_bayes.engine.prediction import nodes, predict_angles, rate_caveat, require_range
     from backdrive_bayes.records.history import noise_free_torque, read_history
 
     posterior = read_posterior(args.posterior)
@@ -60,7 +60,7 @@ def run(args) -> int:
             (out / "draws.csv").unlink(missing_ok=True)
         half = float(np.max(bounds[2] - bounds[1]) / 2)
         about = {"reason": f"{time.size} points, half-width at most {half:.3g}′", "notes": notes}
-        result = _sidecar(args, posterior, about)
+        result = _sidecar(args, posterior, about | {"caveat": rate_caveat(posterior, time, torque)})
         write_json(folder / "prediction.json", result)
     say(f"{result['unit']}: {line(result['outcome'])}")
     say(f"written to {out}/prediction.csv")

@@ -18,7 +18,10 @@ class History(Struct):
 
 
 class PredictionFile(Result, kw_only=True):
-    """prediction.json, beside prediction.csv: what it rests on; ``notes`` say what was guessed or mended in the history."""
+    """prediction.json, beside prediction.csv: what it rests on.
+
+    ``notes`` say what was guessed or mended in the history, ``caveat`` how far its loading rate is from those measured.
+    """
 
     schema: Literal["backdrive-bayes/prediction/1"]
     unit: Text
@@ -26,6 +29,7 @@ class PredictionFile(Result, kw_only=True):
     history: History
     posterior_sha256: Digest
     notes: list[str] = field(default_factory=list)
+    caveat: str = ""
 
 
 class Mark(Struct):

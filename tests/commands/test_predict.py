@@ -46,3 +46,11 @@ def test_draws_of_an_older_prediction_go_and_a_stranger_s_file_stays(predicted, 
     assert "angle_2_arcmin" in drawn.read_text()
     predicted()
     assert not drawn.exists()
+
+
+def test_a_loading_rate_far_from_those_measured_is_a_caveat_and_no_failure(predicted):
+    assert predicted()[0]["outcome"]["caveat"] == ""
+    result, screen = predicted(seconds=0.018)
+    caveat = result["outcome"]["caveat"]
+    assert "10 N·m/s is far from those measured, 0.01 to 0.1 N·m/s" in caveat and caveat in screen
+    assert result["outcome"]["exit_code"] == 0
