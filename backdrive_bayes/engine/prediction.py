@@ -62,8 +62,9 @@ def require_range(posterior: Posterior, torque_nm, extrapolate: bool, where) -> 
     largest, highest = float(np.abs(torque_nm).max()), posterior.context.torque_scale_nm
     reach = (TOP if extrapolate else 1.0 + SLACK) * highest
     if not largest <= reach:
-        hint = "" if extrapolate else f" (--extrapolate goes to {TOP * highest:.4g})"
-        raise BadInput(where, f"torques up to {highest:.4g} N·m, the largest measured{hint}", f"{largest:.4g} N·m")
+        further = f"{TOP * highest:.4g} N·m, {TOP:g} times the largest measured"
+        near = f"{highest:.4g} N·m, the largest measured (--extrapolate goes to {TOP * highest:.4g})"
+        raise BadInput(where, f"torques up to {further if extrapolate else near}", f"{largest:.4g} N·m")
 
 
 def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:

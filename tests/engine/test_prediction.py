@@ -43,7 +43,7 @@ def test_torque_beyond_what_was_measured_needs_leave():
         require_range(posterior, [0.11], False, "x")
     require_range(posterior, [0.11], True, "x")
     for absurd in (1e6, np.nan):
-        with pytest.raises(BadInput, match="x: expected torques up to"):
+        with pytest.raises(BadInput, match="x: expected torques up to 0.12 N·m, 1.2 times the largest measured"):
             require_range(posterior, [absurd], True, "x")
 
 
