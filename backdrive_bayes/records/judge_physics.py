@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from backdrive_bayes.number_text import with_error
 from backdrive_bayes.records.faults import stands_still
 from backdrive_bayes.records.findings import Finding
 from backdrive_bayes.records.lines import Line
@@ -26,10 +27,11 @@ def judge_physics(found: dict, columns: dict[str, str]):
     loop = found["measured_loop"]
     # A frozen channel draws loops of any direction and has a finding of its own.
     if found["energy_given"] and not any(stands_still(frozen) for frozen in found["frozen"].values()):
+        area = with_error(1e3 * loop["loop_area_J"], 1e3 * loop["loop_area_J_sd"])
         yield Finding(
             "error",
             "loop_reversed",
-            f"the loop is passed the wrong way: its area is {loop['loop_area_J']:.3g} ± {loop['loop_area_J_sd']:.1g} J, "
+            f"the loop is passed the wrong way: its area is {area} mJ, "
             f"a reducer would give energy; torque lags the angle, or time runs backwards",
         )
 
@@ -94,7 +96,7 @@ def _signs(found, columns):
             "error",
             "angle_not_answering",
             f"the angle moves {moved * _DEG * 60:.4g}′ but does not follow the torque "
-            f"({rise['rise_rad'] * _DEG * 60:.2g}′ ± {rise['sd_rad'] * _DEG * 60:.1g}′ over a ramp): wrong column?",
+            f"({with_error(rise['rise_rad'] * _DEG * 60, rise['sd_rad'] * _DEG * 60, '′')} over a ramp): wrong column?",
         )
 
 

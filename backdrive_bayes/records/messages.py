@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from backdrive_bayes.number_text import with_error
 from backdrive_bayes.records.faults import held, stands_still
 from backdrive_bayes.records.findings import Finding
 
@@ -88,7 +89,7 @@ def _closure(found, _):
         return
     difference, sd = closure["difference_rad"], closure["sd_rad"]
     place = f"{closure['torque_Nm']:.3g} N·m ({closure['basis']})"
-    text = f"{_arcmin(difference):.2g}′ ± {_arcmin(sd):.1g}′ at {place}"
+    text = f"{with_error(_arcmin(difference), _arcmin(sd), '′')} at {place}"
     if abs(difference) > max(3.0 * sd, 0.02 * found["angle_range_rad"]):
         yield Finding("warning", "not_closed", f"the loop does not close: {text}; angle drifts, creeps or ratchets")
     else:
