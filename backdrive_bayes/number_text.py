@@ -6,6 +6,7 @@ import math
 
 MOST_DECIMALS = 8
 UNDEFINED = "not defined"
+_LARGEST_PLAIN = 1e7
 
 
 def decimals(spread: float, value: float) -> int:
@@ -34,6 +35,14 @@ def interval_text(interval: dict | None, factor: float = 1.0) -> str:
 def marked(text: str, provisional: bool) -> str:
     """The text of an interval, "?" after its median where that is ``provisional``."""
     return text.replace(" [", "? [", 1) if provisional else text
+
+
+def with_error(value: float, sd: float, unit: str = "") -> str:
+    """``value ± sd`` with the decimals of the standard error; a plain number, unless it is too small or large for one."""
+    if sd < 10**-MOST_DECIMALS or not max(abs(value), sd) < _LARGEST_PLAIN:
+        return f"{significant(value)}{unit} ± {significant(sd, 1)}{unit}"
+    n = decimals(sd, value)
+    return f"{_fixed(value, n)}{unit} ± {_fixed(sd, n)}{unit}"
 
 
 def like_interval(value: float | None, interval: dict | None, factor: float = 1.0) -> str:

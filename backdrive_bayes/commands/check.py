@@ -6,6 +6,7 @@ from pathlib import Path
 
 from backdrive_bayes.commands.output import complain, default_out, say, write_folder, write_json
 from backdrive_bayes.commands.results import origin, stamped
+from backdrive_bayes.number_text import with_error
 
 HELP = "read and judge a unit's records: samples, branches, cycles, closure, noise"
 _ARCMIN = 10800.0 / 3.141592653589793
@@ -67,7 +68,7 @@ def _levels(noise: dict) -> str:
 def _measured(loop: dict) -> str:
     width = loop["zero_torque_width_rad"]
     parts = [
-        f"∮τ dθ = {loop['loop_area_J'] * 1e3:.4g} ± {loop['loop_area_J_sd'] * 1e3:.1g} mJ",
+        f"∮τ dθ = {with_error(loop['loop_area_J'] * 1e3, loop['loop_area_J_sd'] * 1e3)} mJ",
         _angle("half peak to peak", loop, "half_peak_to_peak_rad"),
         *([] if width is None else [_angle("w(0)", loop, "zero_torque_width_rad")]),
     ]
@@ -75,11 +76,11 @@ def _measured(loop: dict) -> str:
 
 
 def _angle(name: str, loop: dict, key: str) -> str:
-    return f"{name} = {loop[key] * _ARCMIN:.4g}′ ± {loop[f'{key}_sd'] * _ARCMIN:.1g}′"
+    return f"{name} = {with_error(loop[key] * _ARCMIN, loop[f'{key}_sd'] * _ARCMIN, '′')}"
 
 
 def _closure(record: dict) -> str:
     closure = record["closure"]
     if closure is None:
         return ""
-    return f"; loop closes to {closure['difference_rad'] * _ARCMIN:.2g}′ ± {closure['sd_rad'] * _ARCMIN:.1g}′"
+    return f"; loop closes to {with_error(closure['difference_rad'] * _ARCMIN, closure['sd_rad'] * _ARCMIN, '′')}"

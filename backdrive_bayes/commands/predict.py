@@ -14,6 +14,7 @@ from backdrive_bayes.results import PREDICTION, SEAL, read_group
 HELP = "angle with 90 % interval for a torque history, from a posterior"
 RAD_TO_ARCMIN = 10800.0 / 3.141592653589793
 DRAWS = 400
+NOISY = "the torque history is noisy: it was made monotone between its turning points before it drives the model"
 
 
 def add_arguments(parser) -> None:
@@ -32,16 +33,16 @@ def run(args) -> int:
     import numpy as np
 
     from backdrive_bayes.engine.posterior_read import read_posterior
-    from backdrive_bayes.engine.prediction import nodes, predict_angles, require_range
+    from backdrive_bayes.engine.prediction import nodes, predict_angles, rate_caveat, require_range
     from backdrive_bayes.records.history import noise_free_torque, read_history
 
     posterior = read_posterior(args.posterior)
     if not posterior.converged:
         raise BadInput(args.posterior, "a converged posterior", "one that is not to be used (its indicators.json says why)")
-    time, measured = read_history(args.path)
+    time, measured, notes = read_history(args.path)
     torque, noisy = noise_free_torque(time, measured)
-    if noisy:
-        say("the torque history is noisy: it was made monotone between its turning points before it drives the model")
+    for note in (notes := [*notes, *[NOISY] * noisy]):
+        say(f"note: {note}")
     require_range(posterior, torque, args.extrapolate, args.path)
     if not 0 <= args.draws <= DRAWS:
         raise BadInput("--draws", f"a number from 0 to {DRAWS}", args.draws)
@@ -55,21 +56,24 @@ def run(args) -> int:
             some = curves[np.linspace(0, len(curves) - 1, args.draws).astype(int)]
             names = ",".join(["time_s", "torque_Nm", *(f"angle_{i}_arcmin" for i in range(args.draws))])
             _write(folder / "draws.csv", names, time, measured, nodes(torque), some)
+        elif (out / "prediction.json").is_file():  # those of the prediction that is replaced
+            (out / "draws.csv").unlink(missing_ok=True)
         half = float(np.max(bounds[2] - bounds[1]) / 2)
-        result = _sidecar(args, posterior, f"{time.size} points, half-width at most {half:.3g}′")
+        about = {"reason": f"{time.size} points, half-width at most {half:.3g}′", "notes": notes}
+        result = _sidecar(args, posterior, about | {"caveat": rate_caveat(posterior, time, torque)})
         write_json(folder / "prediction.json", result)
     say(f"{result['unit']}: {line(result['outcome'])}")
     say(f"written to {out}/prediction.csv")
     return result["outcome"]["exit_code"]
 
 
-def _sidecar(args, posterior, told: str) -> dict:
-    """What the prediction rests on: the posterior, the torque history and the options."""
+def _sidecar(args, posterior, about: dict) -> dict:
+    """What the prediction rests on: the posterior, the torque history and the options, beside what is said ``about`` it."""
     with args.path.open("rb") as file:
         history = {"file": args.path.name, "sha256": hashlib.file_digest(file, "sha256").hexdigest()}
     own = {"unit": posterior.unit_name, "data_sha256": list(posterior.data_hashes)}
     digest = read_group(args.posterior, "sample_stats").attrs[SEAL]
-    result = {"schema": PREDICTION, "reason": told, "history": history, "posterior_sha256": digest}
+    result = {"schema": PREDICTION, **about, "history": history, "posterior_sha256": digest}
     options = {"start": args.start, "draws": args.draws, "extrapolate": args.extrapolate}
     return stamped(result, own, posterior.seed, options)
 

@@ -113,5 +113,5 @@ _OF = {
     BLIND: _blind,
     FLEET: _fleet,
     POOL: _pool,
-    PREDICTION: lambda result: Outcome("predicted", result["reason"]),
+    PREDICTION: lambda result: Outcome("predicted", result["reason"], caveat=result["caveat"]),
 }

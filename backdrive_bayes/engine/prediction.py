@@ -19,6 +19,8 @@ PRELOADS = np.array([0.0, 1.0, -1.0, 1 / 3, -1 / 3, 2 / 3, -2 / 3])
 """Torques, in the largest measured one, from which a reducer of unknown history may have come, equally probable."""
 SLACK = 0.02
 """Share by which a torque may pass the largest measured one without being beyond it."""
+RATE_REACH, LONE_RATE_REACH = 3.0, 1.5
+"""Factors by which a loading rate may leave those measured, and a lone one, before a prediction says so."""
 
 
 @one_thread()
@@ -60,8 +62,28 @@ def require_range(posterior: Posterior, torque_nm, extrapolate: bool, where) -> 
     largest, highest = float(np.abs(torque_nm).max()), posterior.context.torque_scale_nm
     reach = (TOP if extrapolate else 1.0 + SLACK) * highest
     if not largest <= reach:
-        hint = "" if extrapolate else f" (--extrapolate goes to {TOP * highest:.4g})"
-        raise BadInput(where, f"torques up to {highest:.4g} N·m, the largest measured{hint}", f"{largest:.4g} N·m")
+        further = f"{TOP * highest:.4g} N·m, {TOP:g} times the largest measured"
+        near = f"{highest:.4g} N·m, the largest measured (--extrapolate goes to {TOP * highest:.4g})"
+        raise BadInput(where, f"torques up to {further if extrapolate else near}", f"{largest:.4g} N·m")
+
+
+def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:
+    """What is to be kept in mind of a history's loading rate, beside those measured; empty where it is among them.
+
+    The rate is the mean of |dτ/dt| while the torque moves. From one rate alone nothing is learnt of how friction grows with it.
+    """
+    steps, seconds = np.abs(np.diff(torque_nm)), np.diff(time_s)
+    moving = steps > 0.0
+    if not moving.any():
+        return ""
+    rate = float(steps[moving].sum() / seconds[moving].sum())
+    low, high = (float(end(posterior.records.rate_nm_per_s)) for end in (np.min, np.max))
+    lone = high < LONE_RATE_REACH * low
+    reach = LONE_RATE_REACH if lone else RATE_REACH
+    if low / reach <= rate <= reach * high:
+        return ""
+    measured = f"the only one measured, {high:.3g} N·m/s" if lone else f"those measured, {low:.3g} to {high:.3g} N·m/s"
+    return f"the loading rate of {rate:.3g} N·m/s is far from {measured}: what it does to the angle is extrapolated"
 
 
 def _part(posterior, first, step):

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from backdrive_bayes.records.branches import find_branches, find_segments
-from backdrive_bayes.records.faults import find_gaps, find_plateaus, find_wild, longest_frozen, quantum
+from backdrive_bayes.records.faults import find_gaps, find_plateaus, find_wild, longest_frozen, quantum, with_wild_bridged
 from backdrive_bayes.records.findings import Finding, errors_of, warnings_of
 from backdrive_bayes.records.judge_physics import judge_line, judge_lost_motion, judge_physics, judge_rated_torque
 from backdrive_bayes.records.lines import highest_line
@@ -55,7 +55,12 @@ def _unit_findings(unit: Unit, records: list[dict]):
 
 
 def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_SHARE) -> dict:
-    """Return what is found in one record, ready for JSON; ``findings`` judge it, ``messages`` are their texts."""
+    """Return what is found in one record, ready for JSON; ``findings`` judge it, ``messages`` are their texts.
+
+    Isolated wild samples are counted and then bridged: inference leaves them out, they say nothing of loop, signs or noise.
+    """
+    channels = _channels(record)
+    record = with_wild_bridged(record)
     time, torque, angle = record.time_s, record.torque_nm, record.angle_rad
     segments = find_segments(time, torque)
     branches = find_branches(time, torque, segments)
@@ -69,10 +74,8 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
         "duration_s": float(time[-1] - time[0]),
         "sampling": _sampling(time),
         "gaps": find_gaps(time, torque),
-        "drop_outs": {"torque": int(find_wild(torque).sum()), "angle": int(find_wild(angle).sum())},
+        **channels,
         "plateaus": find_plateaus(time, torque, low, high),
-        "frozen": {"torque": longest_frozen(torque, angle), "angle": longest_frozen(angle, torque)},
-        "angle_quantum_rad": quantum(angle),
         "angle_range_rad": float(np.ptp(angle)),
         "angle_signal_rad": _signal(angle),
         "branches": [_branch(branch, torque) for branch in branches],
@@ -97,6 +100,15 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
     ]
     named = [replace(finding, record=record.name).to_json() for finding in findings]
     return {**found, "findings": named, "messages": [finding.message(full=False) for finding in findings]}
+
+
+def _channels(record: Record) -> dict:
+    torque, angle = record.torque_nm, record.angle_rad
+    return {
+        "drop_outs": {"torque": int(find_wild(torque).sum()), "angle": int(find_wild(angle).sum())},
+        "frozen": {"torque": longest_frozen(torque, angle), "angle": longest_frozen(angle, torque)},
+        "angle_quantum_rad": quantum(angle),
+    }
 
 
 def _sampling(time: np.ndarray) -> dict:

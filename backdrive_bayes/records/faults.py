@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ _WILD_SD = 12.0
 _PLATEAU_TIMES = 4.0  # a triangle spends 5 % of its time in the top 5 %; so many times that is no triangle
 _MOST_LISTED = 20
 _FROZEN_SHARE = 0.3  # of the other channel's range passed while one stood exactly still
+_HELD_SHARE, _HELD_SAMPLES, _HELD_CHANCE = 0.03, 10, 1e-6
 
 
 def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:
@@ -51,6 +53,15 @@ def without_wild(unit: Unit) -> Unit:
     return replace(unit, records=tuple(_without_wild(r) for r in unit.records))
 
 
+def with_wild_bridged(record: Record) -> Record:
+    """The record with straight lines in place of those samples: as many samples, so that their numbers stay those of the file."""
+    at = np.arange(len(record.time_s))
+    channels = {"torque_nm": record.torque_nm, "angle_rad": record.angle_rad}
+    wild = {name: find_wild(values, SPOILING_SHARE) for name, values in channels.items()}
+    kept = {name: np.interp(at, at[~wild[name]], values[~wild[name]]) for name, values in channels.items() if wild[name].any()}
+    return replace(record, **kept)
+
+
 def _without_wild(record: Record) -> Record:
     wild = find_wild(record.torque_nm, SPOILING_SHARE) | find_wild(record.angle_rad, SPOILING_SHARE)
     count = int(wild.sum())
@@ -74,19 +85,43 @@ def find_plateaus(time_s: np.ndarray, torque_nm: np.ndarray, low: float, high: f
 
 
 def longest_frozen(values: np.ndarray, other: np.ndarray) -> dict:
-    """Longest run of exactly equal values, and the share of the other channel's range passed meanwhile."""
+    """Longest run of exactly equal values, the share of the other channel's range passed meanwhile, and the run's ``chance``.
+
+    ``chance`` bounds the expected number of runs so long in a record of a channel that stands still and has this one's noise:
+    samples · P(noise stays within one quantum)^(length - 1). It is 1 or more where a quantum hides the noise.
+    """
     edges = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]))
     run = int(np.argmax(np.diff(edges)))
     start, stop = int(edges[run]), int(edges[run + 1])
     means = [part.mean() for part in np.array_split(other[start:stop], min(20, stop - start))]
     moved = float(np.ptp(means))
     span = float(np.ptp(other))
-    return {"start": start, "samples": stop - start, "other_share": moved / span if span > 0.0 else 0.0}
+    chance = len(values) * _share_in_one_quantum(values) ** (stop - start - 1)
+    return {"start": start, "samples": stop - start, "other_share": moved / span if span > 0.0 else 0.0, "chance": chance}
 
 
 def stands_still(frozen: dict) -> bool:
     """Whether a run of equal values, as from ``longest_frozen``, is a frozen channel and no quantised one."""
     return frozen["samples"] >= 20 and frozen["other_share"] > _FROZEN_SHARE
+
+
+def held(frozen: dict) -> bool:
+    """Whether noise makes a run of equal values impossible that is too short to count as standing still."""
+    long = frozen["samples"] >= _HELD_SAMPLES and frozen["other_share"] > _HELD_SHARE
+    return long and frozen["chance"] < _HELD_CHANCE and not stands_still(frozen)
+
+
+def _share_in_one_quantum(values: np.ndarray) -> float:
+    """Probability that the channel's noise, at best centred, stays within the channel's own step, 1 without noise."""
+    steps, second = np.diff(np.unique(values)), np.diff(values, 2)
+    steps = steps[steps > 1e-9 * float(np.ptp(values))]  # less are roundings of one level
+    if not steps.size or not second.size:
+        return 1.0
+    step = float(np.median(steps))
+    variance = min(float(np.mean(second**2)), (1.4826 * float(np.median(np.abs(second)))) ** 2) / 6.0
+    # A staircase without noise has second differences of at most one step in root mean square.
+    variance -= step**2 / 6.0
+    return math.erf(step / math.sqrt(8.0 * variance)) if variance > 0.0 else 1.0
 
 
 def quantum(values: np.ndarray) -> float | None:

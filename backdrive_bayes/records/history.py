@@ -16,13 +16,14 @@ NOISY_SHARE = 0.02
 BINS_PER_SEGMENT = 100
 
 
-def read_history(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and torque [N·m], shape (samples,) each; BadInput names file, row and what was found."""
+def read_history(path: Path) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Time [s] and torque [N·m], shape (samples,) each, and notes on what was guessed; BadInput names file, row and finding."""
     channels = read_channels(path, ("time", "torque"), {})
     time, torque = channels.values.values()
     if time.size < 2:
         raise BadInput(path, "a history of at least two samples", f"{time.size}")
-    return strictly_rising(time, channels.first_row, str(path))[0], torque
+    time, clock = strictly_rising(time, channels.first_row, str(path))
+    return time, torque, (*channels.notes, *clock)
 
 
 def noise_free_torque(time_s, torque_nm) -> tuple[np.ndarray, bool]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from backdrive_bayes.number_text import with_error
 from backdrive_bayes.records.faults import stands_still
 from backdrive_bayes.records.findings import Finding
 from backdrive_bayes.records.lines import Line
@@ -21,15 +22,16 @@ def judge_physics(found: dict, columns: dict[str, str]):
     """Findings of one record on its samples, cycles, signs and wraps."""
     yield from _samples(found)
     yield from _signs(found, columns)
-    yield from _jumps(found["angle_jumps"])
+    yield from _jumps(found["angle_jumps"], found["frozen"]["angle"])
     yield from _range(found)
     loop = found["measured_loop"]
     # A frozen channel draws loops of any direction and has a finding of its own.
     if found["energy_given"] and not any(stands_still(frozen) for frozen in found["frozen"].values()):
+        area = with_error(1e3 * loop["loop_area_J"], 1e3 * loop["loop_area_J_sd"])
         yield Finding(
             "error",
             "loop_reversed",
-            f"the loop is passed the wrong way: its area is {loop['loop_area_J']:.3g} ± {loop['loop_area_J_sd']:.1g} J, "
+            f"the loop is passed the wrong way: its area is {area} mJ, "
             f"a reducer would give energy; torque lags the angle, or time runs backwards",
         )
 
@@ -94,7 +96,7 @@ def _signs(found, columns):
             "error",
             "angle_not_answering",
             f"the angle moves {moved * _DEG * 60:.4g}′ but does not follow the torque "
-            f"({rise['rise_rad'] * _DEG * 60:.2g}′ ± {rise['sd_rad'] * _DEG * 60:.1g}′ over a ramp): wrong column?",
+            f"({with_error(rise['rise_rad'] * _DEG * 60, rise['sd_rad'] * _DEG * 60, '′')} over a ramp): wrong column?",
         )
 
 
@@ -105,7 +107,9 @@ def _turned(kind, columns) -> str:
     return f"{kind} = {mark}{turned}{mark}"
 
 
-def _jumps(jumps):
+def _jumps(jumps, frozen):
+    if stands_still(frozen):  # it jumps to where it ought to be when it is read again
+        return
     if jumps["against_motion"]:
         several = jumps["count"] > 1
         yield Finding(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from backdrive_bayes.records.faults import stands_still
+from backdrive_bayes.number_text import with_error
+from backdrive_bayes.records.faults import held, stands_still
 from backdrive_bayes.records.findings import Finding
 
 
@@ -39,9 +40,12 @@ def _channels(found, _):
         if wild:
             text = f"{wild} isolated {channel} sample{'s'[: wild != 1]} far from the neighbours (drop-outs or spikes)"
             yield Finding("error" if wild > 0.02 * found["samples"] else "warning", "isolated_samples", text)
+        text = f"{channel} stands still for {frozen['samples']} samples from sample {frozen['start'] + 1}"
+        text = f"{text} while {other} passes {frozen['other_share']:.0%} of its range"
         if stands_still(frozen):
-            text = f"{channel} stands still for {frozen['samples']} samples from sample {frozen['start'] + 1}"
-            yield Finding("error", "frozen", f"{text} while {other} passes {frozen['other_share']:.0%} of its range")
+            yield Finding("error", "frozen", text)
+        elif held(frozen):
+            yield Finding("warning", "held", f"{text}: its noise forbids that; it is held, not read, or clipped")
     if (found["angle_quantum_rad"] or 0.0) > found["noise"]["white_rad"]:
         yield Finding("note", "quantised", f"angle comes in steps of {_arcmin(found['angle_quantum_rad']):.3g}′")
 
@@ -85,7 +89,7 @@ def _closure(found, _):
         return
     difference, sd = closure["difference_rad"], closure["sd_rad"]
     place = f"{closure['torque_Nm']:.3g} N·m ({closure['basis']})"
-    text = f"{_arcmin(difference):.2g}′ ± {_arcmin(sd):.1g}′ at {place}"
+    text = f"{with_error(_arcmin(difference), _arcmin(sd), '′')} at {place}"
     if abs(difference) > max(3.0 * sd, 0.02 * found["angle_range_rad"]):
         yield Finding("warning", "not_closed", f"the loop does not close: {text}; angle drifts, creeps or ratchets")
     else:

@@ -18,13 +18,18 @@ class History(Struct):
 
 
 class PredictionFile(Result, kw_only=True):
-    """prediction.json, beside prediction.csv: what it rests on."""
+    """prediction.json, beside prediction.csv: what it rests on.
+
+    ``notes`` say what was guessed or mended in the history, ``caveat`` how far its loading rate is from those measured.
+    """
 
     schema: Literal["backdrive-bayes/prediction/1"]
     unit: Text
     reason: str
     history: History
     posterior_sha256: Digest
+    notes: list[str] = field(default_factory=list)
+    caveat: str = ""
 
 
 class Mark(Struct):

@@ -5,7 +5,7 @@ import pytest
 from support.made_posterior import OFFSET, known, made_posterior
 
 from backdrive_bayes.engine import prediction
-from backdrive_bayes.engine.prediction import nodes, predict_angles, require_range
+from backdrive_bayes.engine.prediction import nodes, predict_angles, rate_caveat, require_range
 from backdrive_bayes.errors import BadInput
 
 
@@ -43,8 +43,24 @@ def test_torque_beyond_what_was_measured_needs_leave():
         require_range(posterior, [0.11], False, "x")
     require_range(posterior, [0.11], True, "x")
     for absurd in (1e6, np.nan):
-        with pytest.raises(BadInput, match="x: expected torques up to"):
+        with pytest.raises(BadInput, match="x: expected torques up to 0.12 N·m, 1.2 times the largest measured"):
             require_range(posterior, [absurd], True, "x")
+
+
+def test_loading_rates_far_from_those_measured_are_told():
+    many, lone = made_posterior(), made_posterior(loops=((0.05, 0.1), (0.051, 0.05)))
+    torque = np.interp(np.arange(401), [0, 100, 300, 400], [0, 0.1, 0.1, 0])  # with a dwell, which is no rate
+
+    def told(posterior, rate):
+        return rate_caveat(posterior, np.arange(401) * 0.001 / rate, torque)
+
+    for rate in (0.005, 0.01, 0.1, 0.25):
+        assert told(many, rate) == ""
+    for rate in (0.001, 1.0):
+        assert f"{rate:g} N·m/s is far from those measured, 0.01 to 0.1 N·m/s" in told(many, rate)
+    assert told(lone, 0.06) == ""
+    assert "far from the only one measured, 0.051 N·m/s" in told(lone, 0.1)
+    assert rate_caveat(many, np.arange(401), np.zeros(401)) == ""
 
 
 def test_long_histories_are_evaluated_at_nodes_that_hold_the_turning_points(monkeypatch):

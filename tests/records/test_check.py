@@ -76,6 +76,18 @@ def test_drop_outs_are_counted():
     assert "3 isolated torque samples" in texts(result, "warning")
 
 
+def test_one_wild_sample_changes_neither_signs_nor_jumps_nor_the_measured_loop():
+    time, torque = ramps(noise=0.002)
+    clean = judged(time, torque)[1]
+    for size in (5e3, 1e6):
+        spiky = answer(torque)
+        spiky[700] += size * ARCMIN
+        result, record = judged(time, torque, spiky)
+        assert result["may_infer"] and "1 isolated angle sample" in texts(result, "warning")
+        for name in ("loop_area_J", "zero_torque_width_rad"):
+            assert record["measured_loop"][name] == pytest.approx(clean["measured_loop"][name], rel=1e-3)
+
+
 def test_frozen_channel_speaks_against_inference():
     time, torque = ramps(noise=0.002)
     angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
@@ -83,6 +95,35 @@ def test_frozen_channel_speaks_against_inference():
     result, _ = judged(time, torque, angle, noise=0.0)
     assert "angle stands still for 200 samples from sample 251" in texts(result, "error")
     assert not result["may_infer"] and "stands still" in result["reason"]
+
+
+def test_a_frozen_channel_that_catches_up_is_not_taken_for_a_wrapping_encoder():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    angle[400:810] = angle[400]
+    result, record = judged(time, torque, angle, noise=0.0)
+    assert record["angle_jumps"]["against_motion"] == 1
+    assert "stands still" in texts(result, "error") and not texts(result, "warning")
+
+
+def test_a_run_that_noise_makes_impossible_is_a_warning_and_a_coarse_encoder_is_none():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    for quantum in (0.0, 0.1, 2.0):
+        coarse = np.round(angle / (quantum * ARCMIN)) * quantum * ARCMIN if quantum else angle.copy()
+        assert "stands still" not in texts(judged(time, torque, coarse, noise=0.0)[0], "warning")
+        if quantum < 1.0:
+            coarse[450:510] = coarse[450]
+            result, _ = judged(time, torque, coarse, noise=0.0)
+            assert "r.csv: angle stands still for 60 samples from sample 451 while torque passes" in texts(result, "warning")
+            assert result["may_infer"]
+
+
+def test_a_dwell_of_torque_and_angle_alike_is_no_fault_of_the_encoder():
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    torque[450:550], angle[450:550] = torque[450], angle[450]
+    assert "stands still" not in texts(judged(time, torque, angle, noise=0.0)[0], "warning")
 
 
 def test_angle_lost_in_noise_speaks_against_inference():

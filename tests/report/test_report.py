@@ -8,7 +8,7 @@ from support.pdf import Pages
 from support_results import GROUP_ATTRIBUTES, indicators, write_result
 
 from backdrive_bayes.errors import BadInput, MissingExtra
-from backdrive_bayes.number_text import interval_text, significant
+from backdrive_bayes.number_text import interval_text, significant, with_error
 from backdrive_bayes.report import fit_section, report
 from backdrive_bayes.report.blocks import Note, Picture, Table
 from backdrive_bayes.report.findings import warned
@@ -285,6 +285,9 @@ def test_value_and_interval_share_sensible_decimals(median, lo, hi, shown):
 
 def test_numbers_in_words():
     assert interval_text(None) == "not defined" and significant(None) == "not defined"
+    assert with_error(8.721, 83.2, "′") == "9′ ± 83′" and with_error(-0.337, 0.021) == "−0.337 ± 0.021"
+    assert with_error(61.93, 1040.0) == "62 ± 1040" and with_error(1e250, 1e3) == "1.00e+250 ± 1000"
+    assert with_error(2e-9, 0.0) == "2.00e−09 ± 0"
     assert significant(0.0999977) == "0.100" and significant(1.2e-9, 2) == "1.2e−09"
     assert typeset("W_abs of S_g") == "W\ue000abs\ue001 of S\ue000g\ue001"
     assert typeset("R1.S_g_over_S; sensitivity('W_L_J')") == "R1.S_g_over_S; sensitivity('W_L_J')"
