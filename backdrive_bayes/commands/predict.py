@@ -39,9 +39,9 @@ def run(args) -> int:
     posterior = read_posterior(args.posterior)
     if not posterior.converged:
         raise BadInput(args.posterior, "a converged posterior", "one that is not to be used (its indicators.json says why)")
-    time, measured, notes = read_history(args.path)
+    time, measured, guessed = read_history(args.path)
     torque, noisy = noise_free_torque(time, measured)
-    for note in (notes := [*notes, *[NOISY] * noisy]):
+    for note in (notes := [*guessed, *[NOISY] * noisy]):
         say(f"note: {note}")
     require_range(posterior, torque, args.extrapolate, args.path)
     if not 0 <= args.draws <= DRAWS:
