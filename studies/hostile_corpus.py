@@ -116,7 +116,7 @@ def _foreign():
 def _texts():
     hostile = {
         "integer of 400 digits": ("rated_torque_Nm = 1" + "0" * 400, "300 digits"),
-        "integer of 5000 digits": ("rated_torque_Nm = 1" + "0" * 5000, "TOML"),
+        "integer of 5000 digits": ("rated_torque_Nm = 1" + "0" * 5000, "300 digits"),
         "hexadecimal integer of 9000 digits": ("rated_torque_Nm = 0x" + "f" * 9000, "300 digits"),
         "arrays 20 000 deep": ("rated_torque_Nm = " + "[" * 20_000, "TOML"),
         "key of 900 parts": (".".join("a" * 900) + " = 1", "tables within"),
