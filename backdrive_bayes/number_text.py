@@ -6,7 +6,7 @@ import math
 
 MOST_DECIMALS = 8
 UNDEFINED = "not defined"
-_LARGEST_PLAIN = 1e7
+_LARGEST_PLAIN = 1e7  # longer numbers are not read at a glance
 
 
 def decimals(spread: float, value: float) -> int:

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from backdrive_bayes.gap.examine import examine, given_to_unknown
+from backdrive_bayes.gap.examine import examine, moved_to_unknown
 from backdrive_bayes.gap.probabilities import CALIBRATION, Calibration, credible_set, labels, probabilities
 from backdrive_bayes.records.unit_folder import read_unit
 
@@ -52,7 +52,7 @@ def weigh_unit(folder: Path, truth: dict) -> dict:
         "left": {"+".join(h): round(v, 3) for h, v in found.weighed.left.items()},
         "properties": {p.name: round(p.probability, 4) for p in found.properties},
         "named": "+".join(found.named) or "none",
-        "doubted": found.doubted,
+        "unsupported": found.unsupported,
     }
 
 
@@ -92,7 +92,7 @@ def answers(row: dict, calibration: Calibration) -> dict[str, float]:
 
     found = labels(probabilities(tuples(row["log_factor"]), tuples(row["left"]), row["properties"], calibration))
     likeliest = next(iter(found))
-    return given_to_unknown(found, likeliest) if row.get("doubted") and row["named"] == likeliest else found
+    return moved_to_unknown(found, likeliest) if row.get("unsupported") and row["named"] == likeliest else found
 
 
 def right(row: dict) -> str:

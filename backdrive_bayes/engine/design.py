@@ -28,7 +28,7 @@ STEP = 2e-5
 """Step of the difference quotients by offset and lag."""
 LEAST_LAW = 0.05
 """Range of a term of the rate's law, over the records, below which nothing is known of it."""
-OWN = ("initial", "floating")
+PER_RECORD = ("initial", "floating")
 """Groups of the class of which each record has weights of its own."""
 FLOATING_LOG_SCALE = (float(np.log(0.8)), 0.0)
 """A floating clearance lies anywhere between its flanks."""
@@ -113,14 +113,14 @@ def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion
         columns |= reducer.initial_columns(history, clearance_weights, growth)
         for name, column in columns.items():
             found.setdefault(name, []).append(column)
-    return Design(tuple(Group(n, tuple(c), n in OWN) for n, c in found.items()))
+    return Design(tuple(Group(n, tuple(c), n in PER_RECORD) for n, c in found.items()))
 
 
 def class_prediction(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, weights) -> list[np.ndarray]:
     """The same times ``weights`` by group, the clearance's own where it floats, without the columns."""
     found = []
     for r, history in enumerate(histories(reduced, distortion)):
-        own = {n: np.split(w, len(reduced.blocks))[r] if n in OWN else w for n, w in weights.items()}
+        own = {n: np.split(w, len(reduced.blocks))[r] if n in PER_RECORD else w for n, w in weights.items()}
         found.append(reducer.predict(history, own, distortion.growth(reduced.context.log_rate[r], reduced.context)))
     return found
 

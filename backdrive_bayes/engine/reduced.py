@@ -10,7 +10,7 @@ import numpy as np
 from backdrive_bayes.engine.covariance import channel_covariance, local_slope, path_covariance
 from backdrive_bayes.mechanics.effect import Context
 from backdrive_bayes.records.branches import find_segments
-from backdrive_bayes.records.lines import highest_line
+from backdrive_bayes.records.lines import clearest_line
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import Blocks, reduce_record
@@ -136,7 +136,7 @@ def disturbance(reduced: Reduced) -> float:
     found = []
     for record, noise in zip(reduced.unit.records, reduced.noise, strict=True):
         segments = find_segments(record.time_s, record.torque_nm)
-        line = highest_line(ChannelRecord(record.time_s, record.torque_nm, record.angle_rad, segments), noise)
+        line = clearest_line(ChannelRecord(record.time_s, record.torque_nm, record.angle_rad, segments), noise)
         found.append(-np.inf if line is None else line.log_factor)
     return max(found)
 

@@ -7,28 +7,20 @@ from dataclasses import dataclass
 import emcee
 import numpy as np
 from emcee.moves import DEMove, Move
-from scipy.interpolate import PchipInterpolator
-from scipy.linalg import solve_triangular
-from scipy.special import gammaln, logsumexp
-from scipy.stats import t as student_t
 
 from backdrive_bayes.engine.diagnostics import Convergence, diagnose_draws
 from backdrive_bayes.engine.marginal import LOG_SCALES, Known, Scales, Whitened
+from backdrive_bayes.engine.proposal import Proposal
 
 ENSEMBLES = 4
 WALKERS = 32
-SLICE = np.array([-7.0, -5.5, -4.5, -3.5, -2.5, -1.5, -0.5, 0.5, 1.5, 2.5, 3.5, 4.5, 6.0])
-"""Places, in standard deviations of the Laplace approximation, at which the density is sliced along each of its axes."""
-EDGES = np.linspace(SLICE[0], SLICE[-1], 401)
-"""Cells in which a slice has one density."""
-DOF, WIDE, FAR = 6.0, 1.2, 0.3
-"""Degrees of freedom and width of the Student-t that proposes beyond the slices, and its share."""
 INDEPENDENT = (0.9, 0.6)
 """Share of independent proposals at first and once they learn; the others are differences of walkers, which find what the first
 leave out."""
-KERNELS, LEARNT = 256, 9
-"""Kernels by which draws teach the proposal, and how often they do."""
+LEARNT = 9
+"""How often draws teach the proposal at most: units whose scales trade for each other want up to eight."""
 SETTLING, FIRST_STEPS = 2, 13
+"""Steps that do not count, and steps before the first look: the ensembles then hold the draws that are kept."""
 MOST_STEPS = 384
 KEPT = 400
 """Draws kept of every ensemble."""
@@ -46,85 +38,18 @@ class Draws:
 
 
 class _Independence(Move):
-    """Proposes every walker anew (Metropolised independence), in standard deviations of the Laplace approximation about
-    ``centre``: at first each axis of ``root`` has the density of the target's slice along it, for posteriors of log scales are
-    skewed; once that is found wanting, the density is learnt from draws. Some points come from a wide Student-t."""
+    """Proposes every walker anew (Metropolised independence)."""
 
-    def __init__(self, target, centre, root):
-        self.centre, self.root = centre, root
-        self.shape = _Slices(target, centre, root)
-
-    def learn(self, draws):
-        """Take the place, the width and the shape of ``draws`` (draws, dimension) from now on."""
-        covariance = np.cov(draws, rowvar=False).reshape(self.root.shape)
-        self.centre, self.root = draws.mean(axis=0), np.linalg.cholesky(covariance + 1e-9 * np.diag(np.diag(covariance)))
-        self.shape = _Kernels(self._standard(draws))
-
-    def _standard(self, x):
-        return solve_triangular(self.root, (x - self.centre).T, lower=True, check_finite=False).T
-
-    def log_density(self, x):
-        """Log density up to a constant, (walkers,)."""
-        z = self._standard(x)
-        wide = (student_t.logpdf(z / WIDE, DOF) - np.log(WIDE)).sum(axis=1)
-        return np.logaddexp(np.log(1.0 - FAR) + self.shape.log_density(z), np.log(FAR) + wide)
-
-    def draw(self, random, count):
-        """Points (count, dimension)."""
-        shaped, wide = self.shape.draw(random, count), WIDE * random.standard_t(DOF, (count, self.centre.size))
-        return self.centre + np.where(random.random_sample((count, 1)) < FAR, wide, shaped) @ self.root.T
+    def __init__(self, proposal):
+        self.proposal = proposal
 
     def propose(self, model, state):
         """One step for all walkers; emcee's interface."""
-        new = self.draw(model.random, state.coords.shape[0])
+        new = self.proposal.draw(model.random, state.coords.shape[0])
         log_prob, blobs = model.compute_log_prob_fn(new)
-        ratio = log_prob - state.log_prob + self.log_density(state.coords) - self.log_density(new)
+        ratio = log_prob - state.log_prob + self.proposal.log_density(state.coords) - self.proposal.log_density(new)
         accepted = np.log(model.random.random_sample(new.shape[0])) < ratio
         return self.update(state, emcee.State(new, log_prob=log_prob, blobs=blobs), accepted), accepted
-
-
-class _Slices:
-    """Product of the target's slices along the axes of ``root`` through ``centre``."""
-
-    def __init__(self, target, centre, root):
-        value = target((centre + SLICE[:, None, None] * root.T).reshape(-1, centre.size)).reshape(SLICE.size, -1)
-        middle = 0.5 * (EDGES[1:] + EDGES[:-1])
-        log = PchipInterpolator(SLICE, np.maximum(value - value.max(axis=0), LEAST_LOG))(middle)
-        self.log = log - logsumexp(log, axis=0)
-        self.share = np.vstack([np.zeros(centre.size), np.exp(self.log).cumsum(axis=0)])
-
-    def log_density(self, z):
-        cell = np.searchsorted(EDGES, z) - 1
-        inside = np.all((cell >= 0) & (cell < self.log.shape[0]), axis=1)
-        log = np.take_along_axis(self.log, np.clip(cell, 0, self.log.shape[0] - 1), axis=0) - np.log(EDGES[1] - EDGES[0])
-        return np.where(inside, log.sum(axis=1), -np.inf)
-
-    def draw(self, random, count):
-        chance = random.random_sample((count, self.share.shape[1]))
-        return np.stack([np.interp(c, share, EDGES) for c, share in zip(chance.T, self.share.T, strict=True)], axis=1)
-
-
-class _Kernels:
-    """Kernel density of standardised points (points, dimension): Student-t kernels of Silverman's width.
-
-    Source: Silverman, Density Estimation, 1986, section 4.3.2.
-    """
-
-    def __init__(self, points):
-        self.at = points[np.linspace(0, len(points) - 1, min(KERNELS, len(points))).astype(int)]
-        count, size = self.at.shape
-        self.width = (4.0 / (size + 2.0) / count) ** (1.0 / (size + 4.0))
-        constant = gammaln(0.5 * (DOF + size)) - gammaln(0.5 * DOF) - 0.5 * size * np.log(np.pi * DOF)
-        self.constant = constant - size * np.log(self.width) - np.log(count)
-
-    def log_density(self, z):
-        square = np.sum((z[:, None, :] - self.at) ** 2, axis=2) / self.width**2
-        return self.constant + logsumexp(-0.5 * (DOF + z.shape[1]) * np.log1p(square / DOF), axis=1)
-
-    def draw(self, random, count):
-        spread = self.width * np.sqrt(DOF / random.chisquare(DOF, (count, 1)))
-        at = self.at[random.randint(len(self.at), size=count)]
-        return at + spread * random.standard_normal(at.shape)
 
 
 def sample(
@@ -138,8 +63,8 @@ def sample(
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
     target = _Target(compressed, basis.group, scales, mode)
-    move = _Independence(target, mode[free], _laplace_root(target, mode[free]))
-    samplers, convergence = _ensembles(target, move, [names[i] for i in free], seed, note)
+    proposal = Proposal(target, mode[free], _laplace_root(target, mode[free]))
+    samplers, convergence = _ensembles(target, proposal, [names[i] for i in free], seed, note)
     drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
     density = np.stack([s.get_log_prob().ravel() for s in samplers])
     drawn, density = drawn[:, _thin(drawn)], density[:, _thin(drawn)]
@@ -157,16 +82,16 @@ def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: in
     ``target`` maps points (points, dimension) to log densities (points,) and counts its ``evaluations``; the first proposals
     are made about ``centre`` (dimension,) with the Cholesky factor ``root`` of their covariance.
     """
-    samplers, convergence = _ensembles(target, _Independence(target, centre, root), names, seed, lambda text: None)
+    samplers, convergence = _ensembles(target, Proposal(target, centre, root), names, seed, lambda text: None)
     drawn = np.stack([s.get_chain().reshape(-1, centre.size) for s in samplers])
     return drawn[:, _thin(drawn)], convergence
 
 
-def _ensembles(target, move, names, seed, note):
+def _ensembles(target, proposal, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
 
     def sampler(random_state, share):
-        moves = [(move, share), (DEMove(), 1.0 - share)]
+        moves = [(_Independence(proposal), share), (DEMove(), 1.0 - share)]
         made = emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True)
         made.random_state = random_state
         return made
@@ -175,7 +100,7 @@ def _ensembles(target, move, names, seed, note):
     for chain in range(ENSEMBLES):
         random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
         samplers.append(sampler(random.get_state(), INDEPENDENT[0]))
-        starts.append(samplers[-1].run_mcmc(move.draw(random, WALKERS), SETTLING, skip_initial_state_check=True))
+        starts.append(samplers[-1].run_mcmc(proposal.draw(random, WALKERS), SETTLING, skip_initial_state_check=True))
         samplers[-1].reset()
     while True:
         starts = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, starts, strict=True)]
@@ -190,7 +115,7 @@ def _ensembles(target, move, names, seed, note):
         steps = max(FIRST_STEPS, length // 2)
         if learnt < LEARNT:
             # Draws under one proposal teach the next, which must not count them.
-            move.learn(values.reshape(-1, len(names)))
+            proposal.learn(values.reshape(-1, len(names)))
             steps, learnt = FIRST_STEPS + learnt, learnt + 1
             samplers = [sampler(s.random_state, INDEPENDENT[1]) for s in samplers]
 
@@ -262,8 +187,8 @@ def draw_weights(data: Whitened, basis: Basis, log_scale, fixed, rng, power: flo
 
 LAPLACE_STEP = 0.15
 """Step of the difference quotients by a log scale."""
-OUTSIDE, LEAST_LOG = -1e30, -50.0
-"""Log density beyond the range of log scales, and the least of a slice below its highest."""
+OUTSIDE = -1e30
+"""Log density beyond the range of log scales."""
 STACK = 16
 """Points evaluated at once: more would not stay in the processor's cache."""
 

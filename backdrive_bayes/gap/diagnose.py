@@ -55,7 +55,7 @@ def diagnose(
 
 def _finish(found: Found, progress) -> Diagnosis:
     """The contract's object, with the posterior of the chosen model."""
-    answers, effects = found.answers, ("unknown",) if found.doubted else found.named
+    answers, effects = found.answers, ("unknown",) if found.unsupported else found.named
     inconclusive = _why_inconclusive(found.unit)
     listed = tuple(e for e in effects if e in all_effects())
     progress("sampling the chosen model")

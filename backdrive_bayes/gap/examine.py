@@ -113,7 +113,7 @@ class Found:
         return self.closed_of()
 
     @cached_property
-    def doubted(self) -> bool:
+    def unsupported(self) -> bool:
         """Whether the name explains too little of held-out data to be one."""
         names = set(self.named) - {p.name for p in self.properties} - {STICK_SLIP, "unknown", *self.withheld}
         gap = probabilities.log_misfit(self.weighed.left[()], probabilities.CALIBRATION.spread) > 0
@@ -121,9 +121,9 @@ class Found:
 
     @property
     def answers(self) -> dict[str, float]:
-        """Probabilities by the name of an answer, likeliest first, after the doubt about the likeliest."""
+        """Probabilities by the name of an answer, likeliest first, ``unknown`` where held-out data do not support that."""
         found = self.labels()
-        return given_to_unknown(found, next(iter(found))) if self.doubted else found
+        return moved_to_unknown(found, next(iter(found))) if self.unsupported else found
 
     def labels(self) -> dict[str, float]:
         """Probabilities by the name of an answer, likeliest first."""
@@ -161,8 +161,8 @@ class Found:
         return self.held_out.closed("after", self.rng, LEVEL, fold)
 
 
-def given_to_unknown(answers: dict[str, float], name: str) -> dict[str, float]:
-    """The probabilities with a name's share given to unknown."""
+def moved_to_unknown(answers: dict[str, float], name: str) -> dict[str, float]:
+    """The probabilities with that of a name moved to unknown."""
     answers = dict(answers)
     answers["unknown"] = answers.get("unknown", 0.0) + answers.pop(name)
     return dict(sorted(answers.items(), key=lambda item: -item[1]))

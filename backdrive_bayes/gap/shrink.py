@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 
 from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import Scales, find_scales
+from backdrive_bayes.engine.marginal import Scales, find_scales, whiten
 
 RESAMPLED = 400
 FEWEST_PIECES = 4
@@ -176,20 +176,14 @@ def _alone(design: Design, record: int) -> np.ndarray:
 def _ridge(linear, columns, targets, rows, record, scale, used) -> tuple[np.ndarray, np.ndarray]:
     """Posterior means (used, targets) of the ``used`` weights given some rows of ``targets`` (blocks, targets), offsets by
     record integrated, and a root of their covariance (used, used)."""
-    size = int(used.sum())
-    gram, moment = np.zeros((size, size)), np.zeros((size, targets.shape[1]))
-    rows = rows[np.concatenate(linear.reduced.trust)[rows] == 1.0]
-    start = np.searchsorted(record, np.arange(record.max() + 1))
+    size, rows = int(used.sum()), rows[np.concatenate(linear.reduced.trust)[rows] == 1.0]
+    start, blocks, covariances = np.searchsorted(record, np.arange(record.max() + 1)), [], []
     for r in np.unique(record[rows]):
         at = rows[record[rows] == r]
-        covariance = linear.covariances[r][np.ix_(at - start[r], at - start[r])]
-        lower = np.linalg.cholesky(covariance)
-        both = np.column_stack([columns[np.ix_(at, np.flatnonzero(used))], targets[at], np.ones(at.size)])
-        white = solve_triangular(lower, both, lower=True, check_finite=False)
-        one = white[:, -1] / np.linalg.norm(white[:, -1])
-        white = white[:, :-1] - np.outer(one, one @ white[:, :-1])
-        gram += white[:, :size].T @ white[:, :size]
-        moment += white[:, :size].T @ white[:, size:]
+        blocks.append(np.column_stack([columns[np.ix_(at, np.flatnonzero(used))], targets[at]]))
+        covariances.append(linear.covariances[r][np.ix_(at - start[r], at - start[r])])
+    white = whiten(blocks, [np.zeros(len(b)) for b in blocks], covariances, 1.0).x
+    gram, moment = white[:, :size].T @ white[:, :size], white[:, :size].T @ white[:, size:]
     s = scale[used]
     lower = np.linalg.cholesky(gram * np.outer(s, s) + np.eye(size))
     root = s[:, None] * solve_triangular(lower, np.eye(size), lower=True, check_finite=False).T

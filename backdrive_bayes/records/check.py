@@ -10,7 +10,7 @@ from backdrive_bayes.records.branches import find_branches, find_segments
 from backdrive_bayes.records.faults import find_gaps, find_plateaus, find_wild, longest_frozen, quantum, with_wild_bridged
 from backdrive_bayes.records.findings import Finding, errors_of, warnings_of
 from backdrive_bayes.records.judge_physics import judge_line, judge_lost_motion, judge_physics, judge_rated_torque
-from backdrive_bayes.records.lines import highest_line
+from backdrive_bayes.records.lines import clearest_line
 from backdrive_bayes.records.measured_loop import measure_loop
 from backdrive_bayes.records.messages import judge_record
 from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
@@ -65,7 +65,7 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
     segments = find_segments(time, torque)
     branches = find_branches(time, torque, segments)
     noise = estimate_noise(time, torque, angle, segments)
-    line = highest_line(ChannelRecord(time, torque, angle, segments), noise)
+    line = clearest_line(ChannelRecord(time, torque, angle, segments), noise)
     loop, rise = measure_loop(record, segments, noise), angle_rise(torque, angle, segments, noise)
     low, high = extremes(torque, segments)
     found = {

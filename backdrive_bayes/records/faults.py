@@ -18,6 +18,7 @@ _PLATEAU_TIMES = 4.0  # a triangle spends 5 % of its time in the top 5 %; so man
 _MOST_LISTED = 20
 _FROZEN_SHARE = 0.3  # of the other channel's range passed while one stood exactly still
 _HELD_SHARE, _HELD_SAMPLES, _HELD_CHANCE = 0.03, 10, 1e-6
+# The same, more than a turning point's; samples below which no channel is said to be held; expected runs of the noise alone
 
 
 def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:

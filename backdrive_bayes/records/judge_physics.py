@@ -54,7 +54,7 @@ def judge_line(line: Line | None):
         yield Finding(
             "warning",
             "periodic_disturbance",
-            f"the angle swings at {line.frequency_hz:.3g} Hz (as sampled), {line.height:.2g} times the power of the "
+            f"the angle swings at {line.frequency_hz:.3g} Hz (as sampled), {line.power_ratio:.2g} times the power of the "
             "noise about it: mains hum, vibration, or a ripple of the torque that is not read",
         )
 

@@ -97,23 +97,24 @@ class Spectrum:
     weight: float
     step_s: float
 
-    def model(self, log_correlated, log_white, log_correlation) -> np.ndarray:
-        """Expected power at the ordinates."""
-        phi = np.exp(-self.step_s / np.exp(log_correlation))
-        slow = np.exp(2 * log_correlated) * (1 - phi**2) / (1 - 2 * phi * np.cos(self.omega) + phi**2)
-        return slow + np.exp(2 * log_white) + 1e-9 * self.power.mean() + 1e-40
+    def model(self, theta) -> np.ndarray:
+        """Expected power at the ordinates for log(correlated), log(white), log(correlation time)."""
+        return self._correlated(theta)[0] + np.exp(2 * theta[1]) + 1e-9 * self.power.mean() + 1e-40
 
     def cost(self, theta):
-        """Whittle's negative log likelihood of log(correlated), log(white), log(correlation time), and its gradient (3,)."""
-        correlated, white, correlation = np.exp(theta)
-        phi, cosine = np.exp(-self.step_s / correlation), np.cos(self.omega)
-        below = 1 - 2 * phi * cosine + phi**2
-        slow = correlated**2 * (1 - phi**2) / below
-        model = self.model(*theta)
-        by_phi = -2 * correlated**2 * (phi * below + (1 - phi**2) * (phi - cosine)) / below**2
-        slopes = np.stack([2 * slow, np.full_like(slow, 2 * white**2), by_phi * phi * self.step_s / correlation])
+        """Whittle's negative log likelihood of the same, and its gradient (3,)."""
+        (slow, by_time), model = self._correlated(theta), self.model(theta)
+        slopes = np.stack([2 * slow, np.full_like(slow, 2 * np.exp(2 * theta[1])), by_time])
         fit = self.power / model
         return self.weight * np.sum(np.log(model) + fit), self.weight * slopes @ ((1 - fit) / model)
+
+    def _correlated(self, theta):
+        """Power of the correlated part and its derivative by the log correlation time."""
+        variance, step = np.exp(2 * theta[0]), self.step_s / np.exp(theta[2])
+        phi, cosine = np.exp(-step), np.cos(self.omega)
+        below = 1 - 2 * phi * cosine + phi**2
+        by_phi = -2 * variance * (phi * below + (1 - phi**2) * (phi - cosine)) / below**2
+        return variance * (1 - phi**2) / below, by_phi * phi * step
 
 
 def longest(record: ChannelRecord) -> int:

@@ -126,15 +126,15 @@ def _at(condition):
 
 
 def _table(pair, condition, names, usable):
-    rows, doubted = [], [pair[k] not in usable for k in ("first", "second")]
+    rows, provisional = [], [pair[k] not in usable for k in ("first", "second")]
     for name in (n for n in names if n in condition["indicators"]):
         row = condition["indicators"][name]
         factor, unit = shown_unit(row["unit"], [row[k]["median"] for k in ("first", "second")])
         rows.append(
             [
                 f"{indicator_words(name)} [{unit or '–'}]",
-                *(marked(interval_text(row[k], factor), d) for k, d in zip(("first", "second"), doubted, strict=True)),
-                _ratio_cell(row, factor, unit, any(doubted)),
+                *(marked(interval_text(row[k], factor), d) for k, d in zip(("first", "second"), provisional, strict=True)),
+                _ratio_cell(row, factor, unit, any(provisional)),
                 probability_text(row["probability_first_greater"]),
                 row["verdict"],
             ]

@@ -8,6 +8,7 @@ from scipy.stats import gamma, norm
 
 from backdrive_bayes.engine import sample as engine
 from backdrive_bayes.engine.marginal import Moments, Scales, Whitened, find_scales
+from backdrive_bayes.engine.proposal import Proposal
 from backdrive_bayes.engine.sample import compress, draw_weights, sample
 
 
@@ -169,15 +170,15 @@ def test_signs_and_turns_of_principal_directions_change_no_draw():
     np.testing.assert_allclose(there, here, atol=1e-12)
 
 
-def test_the_move_proposes_from_its_own_density():
-    """The independence move's density is that of its points, up to a constant: a histogram against it in one dimension. That of
+def test_the_proposal_has_the_density_of_its_points():
+    """Up to a constant: a histogram against it in one dimension. That of
     a skewed target it follows, but for the share of the wide tails."""
     target = gamma(4.0, scale=0.5)
-    move = engine._Independence(lambda x: np.maximum(target.logpdf(x[:, 0]), -700.0), np.array([1.5]), np.array([[0.5]]))
-    points = move.draw(np.random.RandomState(0), 40_000)[:, 0]
+    proposal = Proposal(lambda x: np.maximum(target.logpdf(x[:, 0]), -700.0), np.array([1.5]), np.array([[0.5]]))
+    points = proposal.draw(np.random.RandomState(0), 40_000)[:, 0]
     edges = np.linspace(-0.5, 4.5, 41)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    density = np.exp(move.log_density(middle[:, None]))
+    density = np.exp(proposal.log_density(middle[:, None]))
     counts = np.histogram(points, edges)[0]
     expected = density / density.sum() * counts.sum()
     assert np.all(np.abs(counts - expected) < 5 * np.sqrt(expected) + 0.02 * expected)

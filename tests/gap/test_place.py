@@ -79,7 +79,7 @@ def test_a_wrong_name_closes_nothing(unit, name):
 
 
 def test_a_right_name_keeps_its_interval_above_half_where_other_records_tell_little():
-    """One settled loop at each of two rates: what the other record foretells is wide, whatever the name."""
+    """One settled loop at each of two rates: the prediction from the other record is wide, whatever the name."""
     for seed in range(3):
         unit = planted(seed, known=smooth_reducer(), offset_nm=8e-4)
         linear = joint_mode(reduce_unit(unit), library_terms())
@@ -91,7 +91,7 @@ def test_a_right_name_keeps_its_interval_above_half_where_other_records_tell_lit
 
 
 def test_a_property_is_in_the_class_before_and_after():
-    """Nothing is added, so nothing could close: no fraction is told of it, and none doubts it."""
+    """Nothing is added, so nothing could close: there is no fraction, and no reason to call the name unknown."""
     inside, added = (shrunk("asymmetric_stiffness", n) for n in ("second_backlash", "asymmetric_stiffness"))
     np.testing.assert_allclose(inside.after, inside.before)
     def of(named, held_out):

@@ -8,7 +8,7 @@ from support.planted import HERTZ, planted
 
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.check import check_record
-from backdrive_bayes.records.lines import Line, highest_line
+from backdrive_bayes.records.lines import Line, clearest_line
 from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
 
 
@@ -18,7 +18,7 @@ def line_of(added, seed=0):
     angle = record.angle_rad + added(record.time_s, np.random.default_rng(seed))
     segments = find_segments(record.time_s, record.torque_nm)
     noise = estimate_noise(record.time_s, record.torque_nm, angle, segments)
-    return highest_line(ChannelRecord(record.time_s, record.torque_nm, angle, segments), noise)
+    return clearest_line(ChannelRecord(record.time_s, record.torque_nm, angle, segments), noise)
 
 
 @pytest.mark.parametrize("hertz", [7.0, 50.0, 450.0])
@@ -32,12 +32,12 @@ def test_a_hum_is_found_at_its_frequency_as_sampled(hertz):
 @pytest.mark.parametrize("seed", range(6))
 def test_noise_has_none_however_much_there_is(seed, size):
     line = line_of(lambda t, rng: size * rng.standard_normal(t.size), seed)
-    assert line.height < 3 and line.log_factor < -0.5
+    assert line.power_ratio < 3 and line.log_factor < -0.5
 
 
-def test_the_evidence_grows_with_the_height_and_starts_below_none():
-    height = np.array([2.0, 8.0, 20.0, 50.0, 1e3])
-    factor = [Line(50.0, h).log_factor for h in height]
+def test_the_evidence_grows_with_the_power_and_starts_below_none():
+    ratio = np.array([2.0, 8.0, 20.0, 50.0, 1e3])
+    factor = [Line(50.0, h).log_factor for h in ratio]
     assert np.all(np.diff(factor[1:]) > 0) and factor[1] < 0 < factor[3] and Line(50.0, 0.5).log_factor == -np.inf
 
 

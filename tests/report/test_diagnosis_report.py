@@ -101,7 +101,7 @@ def test_a_gap_that_is_not_there(tmp_path):
     assert not any("How far it shrinks" in p or "Next test" in p or "What it changes" in p for p in pages)
 
 
-def test_a_name_that_closes_nothing_is_doubted(tmp_path):
+def test_a_name_that_closes_nothing_is_said_to_predict_nothing(tmp_path):
     result = write_diagnosis(tmp_path, 1)
     for hi, title in ((-0.1, "THE NAME IN DOUBT"), (0.2, "CAUSE NAMED")):
         shrink = result["shrink"] | {"closed_fraction": {"median": -0.4, "lo": -0.8, "hi": hi}}
@@ -132,7 +132,7 @@ def test_what_acts_beside_a_named_module_is_told(tmp_path, unlisted, told):
     assert ("PART OF THE CAUSE NAMED" in pages[0]) == told
 
 
-def test_jumps_are_not_doubted_for_what_wide_blocks_cannot_show(tmp_path):
+def test_jumps_are_not_judged_by_what_wide_blocks_cannot_show(tmp_path):
     result = write_diagnosis(tmp_path, 1)
     shrink = result["shrink"] | {"closed_fraction": {"median": -0.4, "lo": -0.8, "hi": -0.1}}
     write_diagnosis(tmp_path, 1, shrink=shrink, answer={"effects": ["stick_slip"], "credible_set_90": ["stick_slip"]})

@@ -170,19 +170,19 @@ def test_errors_and_warnings_of_the_check_are_counted_apart():
 
 def test_provisional_numbers_are_marked_beside_good_ones(tmp_path):
     bad = indicators(1)["convergence"] | {"converged": False, "advice": "give it more time"}
-    good, doubted, forced = (tmp_path / name for name in ("good", "doubted", "forced"))
+    good, unconverged, forced = (tmp_path / name for name in ("good", "unconverged", "forced"))
     entry = write_result(good, records=1, unit="good")["records"][0]["indicators"]["zero_torque_width_rad"]
-    write_result(doubted, records=1, unit="doubted", convergence=bad, data_sha256=["1" * 64])
+    write_result(unconverged, records=1, unit="unconverged", convergence=bad, data_sha256=["1" * 64])
     write_result(forced, records=1, unit="forced", forced=True, data_sha256=["2" * 64])
-    abouts = [fit_section.chapter(folder).about for folder in (good, doubted, forced)]
-    blocks = overview_blocks([fit_section.chapter(folder) for folder in (good, doubted, forced)], "Report", "today")
+    abouts = [fit_section.chapter(folder).about for folder in (good, unconverged, forced)]
+    blocks = overview_blocks([fit_section.chapter(folder) for folder in (good, unconverged, forced)], "Report", "today")
     plain, marked = (interval_text(entry, ARCMIN).replace(" [", f"{mark} [") for mark in ("", "?"))
     table = next(b for b in blocks if isinstance(b, Table) and b.columns[0] == "Indicator")
     assert [plain, marked, marked] in [row[2:] for row in table.rows]
-    assert table.columns[2:] == ["good", "doubted", "forced, FORCED"] and [a.forced for a in abouts] == [False, False, True]
+    assert table.columns[2:] == ["good", "unconverged", "forced, FORCED"] and [a.forced for a in abouts] == [False, False, True]
     assert any(isinstance(b, Note) and "? marks provisional numbers" in b.text for b in blocks)
-    (doubted / "posterior.nc").unlink()
-    page = pages_of(doubted)[0]
+    (unconverged / "posterior.nc").unlink()
+    page = pages_of(unconverged)[0]
     assert marked in page and "? marks provisional numbers" in page
 
 
