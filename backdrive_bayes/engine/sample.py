@@ -14,14 +14,12 @@ from backdrive_bayes.engine.proposal import Proposal
 
 ENSEMBLES = 4
 WALKERS = 32
-INDEPENDENT = (0.9, 0.6)
-"""Share of independent proposals at first and once they learn; the others are differences of walkers, which find what the first
-leave out."""
-LEARNT = 9
-"""How often draws teach the proposal at most: units whose scales trade for each other want up to eight."""
-SETTLING, FIRST_STEPS = 2, 13
-"""Steps that do not count, and steps before the first look: the ensembles then hold the draws that are kept."""
+INDEPENDENT = 0.9
+"""Share of independent proposals; the others are differences of walkers, which find what the first leave out."""
+FIRST_STEPS = 14
+"""Steps before the first look: the ensembles then hold the draws that are kept."""
 MOST_STEPS = 384
+"""Steps in all, those included that better proposals made worthless."""
 KEPT = 400
 """Draws kept of every ensemble."""
 
@@ -47,6 +45,7 @@ class _Independence(Move):
         """One step for all walkers; emcee's interface."""
         new = self.proposal.draw(model.random, state.coords.shape[0])
         log_prob, blobs = model.compute_log_prob_fn(new)
+        self.proposal.keep(new, log_prob)
         ratio = log_prob - state.log_prob + self.proposal.log_density(state.coords) - self.proposal.log_density(new)
         accepted = np.log(model.random.random_sample(new.shape[0])) < ratio
         return self.update(state, emcee.State(new, log_prob=log_prob, blobs=blobs), accepted), accepted
@@ -63,8 +62,8 @@ def sample(
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
     target = _Target(compressed, basis.group, scales, mode)
-    proposal = Proposal(target, mode[free], _laplace_root(target, mode[free]))
-    samplers, convergence = _ensembles(target, proposal, [names[i] for i in free], seed, note)
+    root = _laplace_root(target, mode[free])
+    samplers, convergence = _ensembles(target, mode[free], root, [names[i] for i in free], seed, note)
     drawn = np.stack([s.get_chain().reshape(-1, free.size) for s in samplers])
     density = np.stack([s.get_log_prob().ravel() for s in samplers])
     drawn, density = drawn[:, _thin(drawn)], density[:, _thin(drawn)]
@@ -82,42 +81,37 @@ def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: in
     ``target`` maps points (points, dimension) to log densities (points,) and counts its ``evaluations``; the first proposals
     are made about ``centre`` (dimension,) with the Cholesky factor ``root`` of their covariance.
     """
-    samplers, convergence = _ensembles(target, Proposal(target, centre, root), names, seed, lambda text: None)
+    samplers, convergence = _ensembles(target, centre, root, names, seed, lambda text: None)
     drawn = np.stack([s.get_chain().reshape(-1, centre.size) for s in samplers])
     return drawn[:, _thin(drawn)], convergence
 
 
-def _ensembles(target, proposal, names, seed, note):
+def _ensembles(target, centre, root, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
-
-    def sampler(random_state, share):
-        moves = [(_Independence(proposal), share), (DEMove(), 1.0 - share)]
-        made = emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True)
-        made.random_state = random_state
-        return made
-
-    samplers, starts, steps, learnt = [], [], FIRST_STEPS, 0
-    for chain in range(ENSEMBLES):
-        random = np.random.RandomState(np.random.SeedSequence([seed, chain]).generate_state(4))
-        samplers.append(sampler(random.get_state(), INDEPENDENT[0]))
-        starts.append(samplers[-1].run_mcmc(proposal.draw(random, WALKERS), SETTLING, skip_initial_state_check=True))
-        samplers[-1].reset()
+    randoms = [np.random.RandomState(np.random.SeedSequence([seed, k]).generate_state(4)) for k in range(ENSEMBLES + 1)]
+    proposal, spent, samplers = Proposal(target, centre, root, randoms.pop()), 0, []
     while True:
-        starts = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, starts, strict=True)]
+        if not samplers:
+            moves = [(_Independence(proposal), INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)]
+            samplers = [emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True) for _ in randoms]
+            points, log_prob = proposal.starts(ENSEMBLES * WALKERS)
+            parts = zip(np.split(points, ENSEMBLES), np.split(log_prob, ENSEMBLES), randoms, strict=True)
+            states = [emcee.State(x, log_prob=p, random_state=random.get_state()) for x, p, random in parts]
+            steps = FIRST_STEPS
+        states = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)]
         chains = [s.get_chain() for s in samplers]
         values = np.stack([c.transpose(1, 0, 2).reshape(-1, len(names)) for c in chains])
-        length = chains[0].shape[0]
+        length, spent = chains[0].shape[0], spent + steps
         when = np.tile(np.arange(length), WALKERS)
         convergence = diagnose_draws(names, values, np.stack([when] * ENSEMBLES), target.evaluations)
         note(f"{target.evaluations} evaluations: {convergence.line()}")
-        if convergence.converged or length >= MOST_STEPS:
+        if convergence.converged or spent >= MOST_STEPS:
             return samplers, convergence
+        if proposal.improve():
+            for random, state in zip(randoms, states, strict=True):
+                random.set_state(state.random_state)
+            samplers = []
         steps = max(FIRST_STEPS, length // 2)
-        if learnt < LEARNT:
-            # Draws under one proposal teach the next, which must not count them.
-            proposal.learn(values.reshape(-1, len(names)))
-            steps, learnt = FIRST_STEPS + learnt, learnt + 1
-            samplers = [sampler(s.random_state, INDEPENDENT[1]) for s in samplers]
 
 
 def _thin(drawn):

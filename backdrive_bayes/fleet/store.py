@@ -85,4 +85,6 @@ def locked(out: Path) -> Iterator[None]:
             left.unlink(missing_ok=True)
         yield
     finally:
+        # Closing is not enough: a worker that is being born holds a copy of the handle for a moment.
+        fcntl.flock(handle, fcntl.LOCK_UN)
         os.close(handle)

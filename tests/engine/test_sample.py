@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import gamma, norm
 
+from backdrive_bayes.engine import proposal as proposal_module
 from backdrive_bayes.engine import sample as engine
 from backdrive_bayes.engine.marginal import Moments, Scales, Whitened, find_scales
 from backdrive_bayes.engine.proposal import Proposal
@@ -170,21 +171,24 @@ def test_signs_and_turns_of_principal_directions_change_no_draw():
     np.testing.assert_allclose(there, here, atol=1e-12)
 
 
-def test_the_proposal_has_the_density_of_its_points():
-    """Up to a constant: a histogram against it in one dimension. That of
-    a skewed target it follows, but for the share of the wide tails."""
+def test_the_proposal_has_the_density_of_its_points_and_the_efficiency_it_believes(monkeypatch):
+    """A histogram against its density in one dimension, and the effective share of its points, sliced and learnt."""
     target = gamma(4.0, scale=0.5)
-    proposal = Proposal(lambda x: np.maximum(target.logpdf(x[:, 0]), -700.0), np.array([1.5]), np.array([[0.5]]))
-    points = proposal.draw(np.random.RandomState(0), 40_000)[:, 0]
+    monkeypatch.setattr(proposal_module, "EFFICIENT", 1.1)
+    density = counted(lambda x: np.maximum(target.logpdf(x[:, 0]), -700.0))
+    proposal = Proposal(density, np.array([1.5]), np.array([[0.5]]), np.random.RandomState(1))
+    assert len(proposal.stages) == proposal_module.LEARNT
     edges = np.linspace(-0.5, 4.5, 41)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    density = np.exp(proposal.log_density(middle[:, None]))
-    counts = np.histogram(points, edges)[0]
-    expected = density / density.sum() * counts.sum()
-    assert np.all(np.abs(counts - expected) < 5 * np.sqrt(expected) + 0.02 * expected)
-    whole, normal = counts.sum() * 0.125, norm(2.0, 1.0)
-    assert np.abs(counts - whole * target.pdf(middle)).sum() < 0.2 * counts.sum()
-    assert np.abs(counts - whole * normal.pdf(middle)).sum() > 0.2 * counts.sum()
+    for stage, efficiency in zip(proposal.stages, proposal.efficiency, strict=True):
+        proposal.now = stage
+        points = proposal.draw(np.random.RandomState(0), 40_000)
+        expected = np.exp(proposal.log_density(middle[:, None])) * (edges[1] - edges[0]) * len(points)
+        counts = np.histogram(points[:, 0], edges)[0]
+        assert np.all(np.abs(counts - expected) < 5 * np.sqrt(expected) + 0.03 * expected)
+        weight = np.exp(density(points) - proposal.log_density(points))
+        assert efficiency == pytest.approx(weight.mean() ** 2 / (weight**2).mean(), rel=0.1)
+    assert min(proposal.efficiency[0], proposal.efficiency[-1]) > 0.65 > proposal.efficiency[2]
 
 
 def test_proposals_far_from_the_target_still_reach_it():
@@ -194,6 +198,27 @@ def test_proposals_far_from_the_target_still_reach_it():
     assert convergence.converged
     flat = found.reshape(-1, 2)
     assert np.abs(flat.mean(axis=0) - 3.0).max() < 0.2 and np.abs(flat.std(axis=0) - 1.0).max() < 0.1
+
+
+def shouldered(x):
+    """Log density of a peak with a third of its mass in a shoulder six standard deviations aside."""
+    peak = norm(0.0, 0.25).logpdf(x[:, 0]) + norm(0.0, 0.7).logpdf(x[:, 1]) + np.log(2 / 3)
+    return np.logaddexp(peak, norm(-1.5, 0.8).logpdf(x[:, 0]) + norm(1.0, 0.6).logpdf(x[:, 1]) + np.log(1 / 3))
+
+
+def test_a_shoulder_far_from_the_mode_is_found(monkeypatch):
+    def mean(seed):
+        found, convergence = engine.sample_density(counted(shouldered), np.zeros(2), np.diag([0.25, 0.7]), ("a", "b"), seed)
+        assert convergence.converged
+        return found[..., 0].mean()
+
+    assert np.all(np.abs([mean(seed) + 0.5 for seed in range(3)]) < 0.12)
+    # The planted fault: slices through the mode, taken as they are, see a part of it and believe it.
+    monkeypatch.setattr(proposal_module, "EFFICIENT", 0.0)
+    monkeypatch.setattr(proposal_module, "POWERS", (1.0,))
+    monkeypatch.setattr(Proposal, "improve", lambda self: False)
+    with pytest.raises(AssertionError):
+        assert np.all(np.abs([mean(seed) + 0.5 for seed in range(3)]) < 0.12)
 
 
 def counted(density):
