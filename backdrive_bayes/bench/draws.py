@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.linalg import solve_banded
 
 
 def log_uniform(rng, low: float, high: float) -> float:
@@ -25,4 +25,9 @@ def ornstein_uhlenbeck(rng, samples: int, keep: float):
     """A stationary first-order process of unit variance, shape (samples,), of which a step keeps the share ``keep``."""
     push = rng.standard_normal(samples)
     push[1:] *= np.sqrt(1.0 - keep**2)
-    return lfilter([1.0], [1.0, -keep], push)
+    return first_order(push, keep)
+
+
+def first_order(push, keep: float):
+    """Values (samples,) of which a step keeps the share ``keep`` and adds ``push`` (samples,)."""
+    return solve_banded((1, 0), np.array([np.ones(len(push)), np.full(len(push), -keep)]), push)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
+from backdrive_bayes.bench.draws import first_order
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
 from backdrive_bayes.records.record import Record, Unit
@@ -81,7 +81,7 @@ def angle_noise(n: int, step_s: float, noise: BenchNoise, rng) -> np.ndarray:
     phi = np.exp(-step_s / noise.correlation_time_s)
     drive = rng.standard_normal(n) * np.sqrt(1 - phi**2)
     drive[0] = rng.standard_normal()
-    return noise.correlated_rad * lfilter([1], [1, -phi], drive) + noise.white_rad * rng.standard_normal(n)
+    return noise.correlated_rad * first_order(drive, phi) + noise.white_rad * rng.standard_normal(n)
 
 
 def simulate_record(name, known: KnownReducer, amplitude_nm, rate_nm_per_s, noise: BenchNoise, rng, sampling_hz=1000.0) -> Record:

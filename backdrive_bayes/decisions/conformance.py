@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 
 class Verdict(enum.Enum):
@@ -81,7 +81,7 @@ def guard_bands(values, risk: float) -> tuple[float, float]:
 
 def normal_conformance(estimate, uncertainty, lo=-np.inf, hi=np.inf):
     """p_c of a normal state of knowledge with that estimate and standard uncertainty. JCGM 106:2012, 7.2 to 7.5."""
-    return norm.cdf((hi - estimate) / uncertainty) - norm.cdf((lo - estimate) / uncertainty)
+    return ndtr((hi - estimate) / uncertainty) - ndtr((lo - estimate) / uncertainty)
 
 
 def acceptance_interval(uncertainty: float, lo: float, hi: float, conformance: float) -> tuple[float, float] | None:
@@ -92,5 +92,5 @@ def acceptance_interval(uncertainty: float, lo: float, hi: float, conformance: f
             return None
         half = brentq(lambda d: normal_conformance(centre + d, uncertainty, lo, hi) - conformance, 0.0, reach)
         return centre - half, centre + half
-    guard = norm.ppf(conformance) * uncertainty
+    guard = ndtri(conformance) * uncertainty
     return lo + guard, hi - guard

@@ -147,16 +147,19 @@ class _Search:
         jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
         learnings = LEARNINGS if refine else 0
         covariances = reduced.covariances(reduced.slopes(reduced.angles, 2.0), jitter)
-        laid, weights, start, refined = None, None, None, 0
+        laid, weights, refined = None, None, 0
+        known: dict[str, float] = {}
         idle: set[str] = set()
         for step in range(steps):
             if laid is None or (not refined and _far(laid, distortion, context)):
                 laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules), None
             if weights is None:
                 design = class_groups(reduced, reducer, distortion).joined(*self.fixed)
-                weights = design.split(self._solve(reducer, design, reduced.angles, covariances, None)[2].mean)
-                start = None
-            linear, start = self._linear(reducer, distortion, weights, covariances, start, jitter, idle)
+                weights = design.split(self._solve(reducer, design, reduced.angles, covariances, known)[2].mean)
+                # With other columns the scales may have another mode: they are searched anew.
+                known = {}
+            linear = self._linear(reducer, distortion, weights, covariances, known, jitter, idle)
+            known = linear.log_scale
             weights, before, idle = linear.weights, idle, idle | self._backward(linear)
             moved = self._moved(linear)
             still = idle == before and _length(moved, distortion, context) < 0.025 * LONGEST_STEP
@@ -183,22 +186,21 @@ class _Search:
             torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
-    def _linear(self, reducer, distortion, weights, covariances, start, jitter, idle):
+    def _linear(self, reducer, distortion, weights, covariances, known, jitter, idle):
         core = class_groups(self.reduced, reducer, distortion, weights.get("clearance"))
         tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
         design = core.joined(*self.fixed, *tangents)
         shift = _shift(design, distortion, self.effects, self.reduced.context)
         angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
-        if start is not None and start.size != len(design.groups):
-            start = None
-        data, log_scale, solution = self._solve(reducer, design, angles, covariances, start, idle)
+        data, log_scale, solution = self._solve(reducer, design, angles, covariances, known, idle)
         named = dict(zip(design.names, log_scale, strict=True))
         explained = design.predict(design.split(solution.mean))
         predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
         shared = (self.reduced, reducer, distortion, design, self.effects, angles, tuple(covariances), data)
-        return Linear(*shared, named, solution, jitter, predicted), log_scale
+        return Linear(*shared, named, solution, jitter, predicted)
 
-    def _solve(self, reducer, design, angles, covariances, start, idle=frozenset()):
+    def _solve(self, reducer, design, angles, covariances, known, idle=frozenset()):
+        """Whitened data, log scales and weights; ``known`` log scales by name are where the search begins."""
         priors = class_priors(reducer)
         for effect in self.effects:
             free = self._acts(effect) and effect.name not in idle
@@ -207,7 +209,8 @@ class _Search:
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.trust)
         scales = design.scales(priors)
-        if start is not None:
+        if known:
+            start = np.array([known.get(name, mean) for name, mean in zip(design.names, scales.mean, strict=True)])
             return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean), 4)
         # Steps near zero torque are free play or clearance: two modes, of which the better is taken.
         found = []

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.linalg import solve_banded
 
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle
@@ -99,8 +99,9 @@ def _angle_error(record: Record, weights: np.ndarray, noise: NoiseEstimate) -> f
     white = noise.white_rad**2 * float(weights @ weights)
     step = float(np.median(np.diff(record.time_s)))
     decay = float(np.exp(-step / noise.correlation_time_s))
-    # weights' covariance in an AR(1) process, in one pass
-    correlated = float(weights @ (2.0 * lfilter([1.0], [1.0, -decay], weights) - weights))
+    # Weights' covariance in a first-order process, in one pass: each sum keeps the share ``decay`` of the one before.
+    steps = np.array([np.ones(weights.size), np.full(weights.size, -decay)])
+    correlated = float(weights @ (2.0 * solve_banded((1, 0), steps, weights) - weights))
     return float(np.sqrt(max(white + noise.correlated_rad**2 * correlated, 0.0)))
 
 

@@ -174,12 +174,6 @@ def test_friction_that_follows_the_rate_is_found_at_its_own_mode():
     assert [m.distortion.friction_exponent for m in found] == pytest.approx([0.4, 0.0, 0.4], abs=0.05)
 
 
-def test_an_early_angle_is_no_lag_at_any_mode():
-    for found in linearise(reduce_unit(planted(known=smooth_reducer(), lag_s=-0.03)), library_terms()):
-        trace = LIBRARY["sensor_lag"][0].trace(found.reduced.context)
-        assert found.log_scale["sensor_lag"] == pytest.approx(np.log(trace))
-
-
 def test_an_offset_of_a_fifth_of_the_range_is_a_start():
     """Far beyond a zero error: legs are compared about every offset."""
     for offset_nm in (0.02, -0.02):

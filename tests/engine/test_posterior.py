@@ -10,7 +10,7 @@ from support.planted import joint_mode, planted
 
 from backdrive_bayes.bench.known_truth import BenchNoise, random_reducer, simulate_unit
 from backdrive_bayes.engine import infer as module
-from backdrive_bayes.engine import sample
+from backdrive_bayes.engine import proposal, sample
 from backdrive_bayes.engine.infer import infer, library_terms
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.indicators.draws import IndicatorDraws, core_indicators
@@ -29,8 +29,14 @@ def fitted(unit: Unit, effects=(), seed=0, power=1.0):
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "POWER", power)
-        for name, value in (("WALKERS", 16), ("FIRST_STEPS", 6), ("MOST_STEPS", 6)):
-            patch.setattr(sample, name, value)
+        for room, name, value in (
+            (sample, "WALKERS", 16),
+            (sample, "FIRST_STEPS", 6),
+            (sample, "MOST_STEPS", 6),
+            (proposal, "BATCH", 48),
+            (proposal, "EFFICIENT", 0.0),
+        ):
+            patch.setattr(room, name, value)
         return infer(joint_mode(reduce_unit(unit, 30), effects), (), seed)
 
 

@@ -10,6 +10,7 @@ from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.gap import probabilities as gap
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
+from backdrive_bayes.mechanics.registry import LIBRARY
 
 NAMED = [n for n in UNITS if n != "asymmetric_stiffness"]
 SYMMETRY_BREAKERS = [n for n in NAMED if n not in ("none", "second_backlash", "interface_slip")]
@@ -103,6 +104,8 @@ def test_an_early_angle_is_no_lag():
     late, early = found("sensor_lag")[0], weigh(prepare(planted(known=smooth_reducer(), lag_s=-0.03)))
     assert late.log_factor[("sensor_lag",)] > 15 and early.log_factor[("sensor_lag",)] < 1
     assert early.linears[0].distortion.lag_s < 1e-3
+    for mode in early.linears:
+        assert mode.log_scale["sensor_lag"] == pytest.approx(np.log(LIBRARY["sensor_lag"][0].trace(mode.reduced.context)))
 
 
 def test_one_rate_says_nothing_of_a_law_of_the_rate():
