@@ -3,7 +3,7 @@
     python studies/exactness.py [--steps 1200] [--out reports/exactness]
 
 One unit of known truth. Dense: the multivariate t of all block means, offsets taken out by an orthonormal basis, at draws of the
-scales. Sampler: its draws (independence proposals from an adapted Laplace approximation, differential evolution beside them)
+scales. Sampler: its draws (independence proposals that learn from all points evaluated, differential evolution beside them)
 against emcee's stretch move alone, on the same marginal density, in the same run; and, where numpyro and dynesty are installed,
 against NUTS, and a reduced case's evidence against nested sampling.
 """
