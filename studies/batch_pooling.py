@@ -116,7 +116,7 @@ def cell(units: int, ratio: float, fault: str, batches: int) -> dict:
     began = time.perf_counter()
     results = [one_batch(units, ratio, fault, seed) for seed in range(batches)]
     found = [r for r in results if not r["refused"]]
-    low, high = (binom.ppf([BOUND, 1 - BOUND], len(found), LEVEL) / len(found)).tolist()
+    low, high = (float(end) for end in np.asarray(binom.ppf([BOUND, 1 - BOUND], len(found), LEVEL)) / len(found))
     shares = {name: float(np.mean([r[name] for r in found])) for name in ("mean", "spread", "next")}
     return {
         "units": units, "ratio": ratio, "fault": fault, "batches": batches, "refused": batches - len(found), **shares,

@@ -98,10 +98,10 @@ def one_unit(template: Template, seed: int) -> dict:
     flat = drawn.log_scale.reshape(-1, mode.size)[:: max(1, drawn.log_density.size // 400)]
     small, basis = compress(data, scales, mode)
     truth = template.quantities(log_scale[None], weights[None])
-    result = {"seed": seed, "converged": bool(drawn.convergence.converged), "evaluations": int(drawn.convergence.evaluations)}
+    told = drawn.convergence
+    result: dict = {"seed": seed, "converged": bool(told.converged), "evaluations": int(told.evaluations)}
     for label, power in (("whole", 1.0), ("package", POWER)):
-        coarse = small.coarsened(power)
-        own = np.vstack([draw_weights(coarse, basis, point, 1, rng) for point in flat])
+        own = draw_weights(small, basis, flat, ~scales.free, rng, power)
         found = template.quantities(flat, own)
         result[label] = {n: placed(float(truth[n][0]), v, rng) for n, v in found.items()}
         if label == "whole":
@@ -120,7 +120,8 @@ def placed(truth: float, draws, rng, width: float = 1.0) -> dict:
 
 def summarise(results, label: str) -> dict:
     """Coverage and uniformity of every quantity over all units, converged or not; Holm's correction over quantities."""
-    table, n = {}, len(results)
+    table: dict[str, dict] = {}
+    n = len(results)
     for name in results[0][label]:
         counts = np.bincount([r[label][name]["rank"] // TENTHS for r in results], minlength=TENTHS)
         covered = np.mean([r[label][name]["covered"] for r in results], axis=0)
@@ -136,9 +137,9 @@ def page(results, seconds: float) -> str:
     """The report in Markdown."""
     tables = {label: summarise(results, label) for label in ("whole", "package", "planted")}
     n = len(results)
-    low, high = binom.ppf([0.005, 0.995], n, 0.9) / n
+    low, high = np.asarray(binom.ppf([0.005, 0.995], n, 0.9)) / n
     count, rejected = len(tables["whole"]["quantities"]), {k: t["rejected"] for k, t in tables.items()}
-    bounds = [binom.ppf([0.005, 0.995], n, level) / n for level in LEVELS]
+    bounds = [np.asarray(binom.ppf([0.005, 0.995], n, level)) / n for level in LEVELS]
     outside = sum(not low <= share <= high for row in tables["whole"]["quantities"].values()
                   for share, (low, high) in zip(row["shares"], bounds, strict=True))
     lines = [

@@ -89,7 +89,7 @@ def against_dense(problem: Problem, draws) -> np.ndarray:
         log_scale = problem.mode.copy()
         log_scale[scales.free] = point
         scale = scales.of_weights(log_scale)
-        dense = multivariate_t.logpdf(y, None, noise + (x * scale**2) @ x.T, linear.data.noise_dof)
+        dense = multivariate_t.logpdf(y, None, noise + (x * scale**2) @ x.T, linear.data.noise_dof)  # type: ignore[arg-type]
         compressed = small.log_marginal(np.exp(log_scale)[turned.group])
         rows.append((linear.data.log_marginal(scale) - dense, compressed - dense))
     return np.array(rows) - np.mean(rows, axis=0)
@@ -111,7 +111,7 @@ def stretch_move(problem: Problem, steps: int) -> Run:
     start = time.perf_counter()
     data, basis = engine.compress(problem.linear.data, problem.scales, problem.mode)
     free = np.flatnonzero(problem.scales.free)
-    target = engine._Target(data, basis.group, problem.scales, problem.mode, free)
+    target = engine._Target(data, basis.group, problem.scales, problem.mode)
     chains = []
     for chain in range(engine.ENSEMBLES):
         random = np.random.RandomState(chain)

@@ -65,7 +65,7 @@ def finished(out: Path) -> int:
 
 def disturbed(folder: Path, out: Path, units: int, rng) -> dict:
     """Runs until one ends by itself; what was done to them."""
-    told = {"workers_killed": 0, "runs_killed_at": [], "orphans": 0}
+    told: dict = {"workers_killed": 0, "runs_killed_at": [], "orphans": 0}
     goals = [int(units * min(0.95, max(0.05, share + 0.1 * rng.standard_normal()))) for share in RUNS_KILLED]
     while True:
         running = start(folder, out)

@@ -112,7 +112,8 @@ def loopback_bytes() -> int:
 
 def scheduler_cost(units, out: Path, workers: int, times: int) -> dict:
     """A scheduler in a process of its own: processor seconds and bytes a task, and at rest a second."""
-    python, quiet = [sys.executable, "-m"], {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    python = [sys.executable, "-m"]
+    quiet: dict = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     environment = os.environ | {"PYTHONPATH": str(STUDIES), "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
                                 "DASK_DISTRIBUTED__SCHEDULER__WORK_STEALING": "False"}  # fmt: skip
     port = 18786 + os.getpid() % 1000

@@ -77,8 +77,8 @@ def run(arguments: list[str], folder: Path) -> Outcome:
     _, status, usage = os.wait4(child, 0)
     code = os.waitstatus_to_exitcode(status)
     litter = tuple(p.name for p in folder.rglob("*.part"))
-    read = [path.read_text(errors="replace") if path.exists() else "" for path in (out, err)]
-    return Outcome(code, *read, time.perf_counter() - began, usage.ru_maxrss * 1024, litter)
+    said, complaints = (path.read_text(errors="replace") if path.exists() else "" for path in (out, err))
+    return Outcome(code, said, complaints, time.perf_counter() - began, usage.ru_maxrss * 1024, litter)
 
 
 def _be_child(arguments, folder, out, err):

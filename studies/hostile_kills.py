@@ -84,7 +84,7 @@ def _round(verb: Verb, room: Path, kills: int, rng) -> dict:
     verb.code = _start(verb, still, room).wait()
     verb.seconds = time.perf_counter() - began
     verb.files = _files(still)
-    row = {"verb": verb.name, "seconds": verb.seconds, "late": 0, "faults": []} | dict.fromkeys(SIGNALS, 0)
+    row: dict = {"verb": verb.name, "seconds": verb.seconds, "late": 0, "faults": []} | dict.fromkeys(SIGNALS, 0)
     out = room / f"{verb.name}-killed"
     for _ in range(3 * kills):
         sent = sum(row[number] for number in SIGNALS)

@@ -96,7 +96,7 @@ def trends(results) -> list[dict]:
             if not all(name in by_name and by_name[name]["all"]["converged"] for name in (low, high)):
                 rows.append({"from": low, "to": high, "inconclusive": "one of the two has not converged"})
                 continue
-            row = {"from": low, "to": high}
+            row: dict = {"from": low, "to": high}
             for name, sign in zip(PARAMETERS, (-1, 1, 1), strict=True):
                 a, b = (np.array(by_name[u]["draws"][name]) for u in (low, high))
                 n = min(a.size, b.size)

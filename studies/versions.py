@@ -64,7 +64,7 @@ def lowest() -> list[str]:
     """Constraints that hold every named dependency at its lowest release series."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     named = [*project["dependencies"], *(r for extra in EXTRAS for r in project["optional-dependencies"][extra])]
-    bounds = dict(re.fullmatch(r"([\w-]+)>=([\d.]+)", requirement).groups() for requirement in named)
+    bounds = dict(requirement.split(">=") for requirement in named)
     return [f"{name}=={bound}{('.0.*', '.*', '')[bound.count('.')]}" for name, bound in bounds.items()]
 
 
@@ -112,7 +112,7 @@ def _try(folder: Path) -> dict[str, int]:
     empty, command = folder / "empty", folder / "env" / "bin" / "backdrive-bayes"
     empty.mkdir()
     unit = folder / "data" / "reducer-1"
-    calls = {"check": [unit, "-o", "out"], "fit": [unit, "-o", "out"], "report": ["out"]}
+    calls: dict[str, list] = {"check": [unit, "-o", "out"], "fit": [unit, "-o", "out"], "report": ["out"]}
     return {verb: _run([command, verb, *arguments], empty, check=False).returncode for verb, arguments in calls.items()}
 
 
@@ -120,9 +120,11 @@ def _python(version: str) -> str:
     """An interpreter of that version: on the path, or among those of pyenv."""
     found = shutil.which(f"python{version}")
     known = sorted((Path.home() / ".pyenv" / "versions").glob(f"{version}.*/bin/python"))
-    if not (known or found):
+    if known:
+        return str(known[-1])
+    if not found:
         raise SystemExit(f"no Python {version} found")
-    return str(known[-1]) if known else found
+    return found
 
 
 def _run(arguments, folder, check=True):
