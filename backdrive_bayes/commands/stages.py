@@ -20,20 +20,20 @@ class Stage:
 
 
 # Seconds of reducer-1 and reducer-2 on one quiet core; only their ratios matter, a run tells its own speed.
-_PREPARED = (Stage("reducing the records", 0.5), Stage("finding the mode", 5.0))
-_WEIGHED = Stage("weighing effects", 6.0)
-_SAMPLED = Stage("evaluations", 5.0)
-_TOLD = Stage("indicators and their intervals", 6.0)
-_KEPT = (Stage("saving the posterior", 0.5), Stage("figures", 6.0))
+_PREPARED = (Stage("reducing the records", 1.0), Stage("finding the mode", 4.5))
+_WEIGHED = Stage("weighing effects", 5.0)
+_SAMPLED = Stage("evaluations", 2.0)
+_TOLD = Stage("indicators and their intervals", 2.5)
+_KEPT = (Stage("saving the posterior", 2.0), Stage("figures", 3.0))
 FIT = (*_PREPARED, _WEIGHED, _SAMPLED, _TOLD)
 FIT_KEPT = (*FIT, *_KEPT)
 _LOCATED = (*_PREPARED, _WEIGHED, Stage("where it lies", 2.0))
-DIAGNOSE = (*_LOCATED, Stage("sampling the chosen model", 4.0), _SAMPLED, _TOLD, *_KEPT)
+DIAGNOSE = (*_LOCATED, Stage("sampling the chosen model", 2.0), _SAMPLED, _TOLD, *_KEPT)
 _SIMULATOR = (
     Stage("simulator: reducing", 0.5), Stage("simulator: finding", 5.0), Stage("simulator: sampling", 10.0),
     Stage("splitting the gap", 3.0),
 )  # fmt: skip
-DIAGNOSE_SIMULATED = (*_LOCATED, Stage("sampling the chosen model", 4.0), _SAMPLED, *_SIMULATOR, _TOLD, *_KEPT)
+DIAGNOSE_SIMULATED = (*_LOCATED, Stage("sampling the chosen model", 2.0), _SAMPLED, *_SIMULATOR, _TOLD, *_KEPT)
 ACCEPT = (*FIT, *_LOCATED)
 
 
