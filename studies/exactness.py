@@ -29,7 +29,7 @@ from backdrive_bayes.engine.diagnostics import diagnose_draws
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import Scales, find_scales
+from backdrive_bayes.engine.marginal import Scales, Whitened, find_scales, whiten
 
 LOOPS = ((0.1, 0.01), (0.1, 0.05), (0.1, 0.1))
 DENSE = 12
@@ -61,6 +61,8 @@ class Problem:
     """One unit's linear model with its scales at the mode."""
 
     linear: Linear
+    data: Whitened
+    """Every block at the full power of its likelihood: only then is there a covariance matrix to compare with."""
     scales: Scales
     mode: np.ndarray
 
@@ -73,8 +75,9 @@ def make_problem() -> Problem:
     known = physical_reducer(np.random.default_rng(0))
     linear = prepare(simulate_unit(known, LOOPS, BenchNoise(), np.random.default_rng(1)))[0]
     scales = linear.design.scales(levels(linear, ()))
-    mode, _ = find_scales(linear.data, scales)
-    return Problem(linear, scales, mode)
+    data = whiten(linear.design.records(), linear.angles, linear.covariances, linear.data.noise_dof)
+    mode, _ = find_scales(data, scales)
+    return Problem(linear, data, scales, mode)
 
 
 def against_dense(problem: Problem, draws) -> np.ndarray:
@@ -83,15 +86,15 @@ def against_dense(problem: Problem, draws) -> np.ndarray:
     basis = null_space(block_diag(*(np.ones((1, a.size)) for a in linear.angles)))
     x, y = basis.T @ np.vstack(linear.design.records()), basis.T @ np.concatenate(linear.angles)
     noise = basis.T @ block_diag(*linear.covariances) @ basis
-    small, turned = engine.compress(linear.data, scales, problem.mode)
+    small, turned = engine.compress(problem.data, scales, problem.mode)
     rows = []
     for point in draws:
         log_scale = problem.mode.copy()
         log_scale[scales.free] = point
         scale = scales.of_weights(log_scale)
-        dense = multivariate_t.logpdf(y, None, noise + (x * scale**2) @ x.T, linear.data.noise_dof)  # type: ignore[arg-type]
+        dense = multivariate_t.logpdf(y, None, noise + (x * scale**2) @ x.T, problem.data.noise_dof)  # type: ignore[arg-type]
         compressed = small.log_marginal(np.exp(log_scale)[turned.group])
-        rows.append((linear.data.log_marginal(scale) - dense, compressed - dense))
+        rows.append((problem.data.log_marginal(scale) - dense, compressed - dense))
     return np.array(rows) - np.mean(rows, axis=0)
 
 
@@ -99,7 +102,7 @@ def project_sampler(problem: Problem) -> Run:
     start = time.perf_counter()
     kept = engine.KEPT
     engine.KEPT = 10**9
-    found = engine.sample(problem.linear.data, problem.scales, problem.mode, problem.linear.design.names, 0)
+    found = engine.sample(problem.data, problem.scales, problem.mode, problem.linear.design.names, 0)
     engine.KEPT = kept
     seconds, told = time.perf_counter() - start, found.convergence
     ess = np.minimum(told.bulk_ess, told.tail_ess)
@@ -109,7 +112,7 @@ def project_sampler(problem: Problem) -> Run:
 def stretch_move(problem: Problem, steps: int) -> Run:
     """Four ensembles of emcee's default move on the compressed data, begun about the mode."""
     start = time.perf_counter()
-    data, basis = engine.compress(problem.linear.data, problem.scales, problem.mode)
+    data, basis = engine.compress(problem.data, problem.scales, problem.mode)
     free = np.flatnonzero(problem.scales.free)
     target = engine._Target(data, basis.group, problem.scales, problem.mode)
     chains = []
@@ -128,7 +131,7 @@ def stretch_move(problem: Problem, steps: int) -> Run:
 
 def nuts_run(problem: Problem) -> Run:
     """NUTS on the same compressed data, compilation included."""
-    data, basis = engine.compress(problem.linear.data, problem.scales, problem.mode)
+    data, basis = engine.compress(problem.data, problem.scales, problem.mode)
     free = np.flatnonzero(problem.scales.free)
     density = marginal_in_jax(data, basis.group, problem.scales, problem.mode, free)
     return Run(*nuts(density, problem.mode[free], problem.names))
@@ -184,7 +187,7 @@ def report(problem: Problem, dense, ours: Run, plain: Run) -> str:
     whole, small = np.abs(dense).max(axis=0)
     per_evaluation = ours.ess.min() / ours.evaluations / (plain.ess.min() / plain.evaluations)
     per_second = ours.ess.min() / ours.seconds / (plain.ess.min() / plain.seconds)
-    rows, weights = problem.linear.data.x.shape
+    rows, weights = problem.data.x.shape
     lines = [
         "# Is the inference exact?", "",
         "Made by `python studies/exactness.py` in one run; seconds are those of one core of that machine, ratios carry over.", "",
