@@ -39,6 +39,7 @@ def test_what_is_forbidden_is_seen():
     assert missing(TEXT.replace("backdrive-bayes demo", "backdrive-bayes show")) == ["show"]
 
 
-def test_types_are_checked_in_the_whole_package():
+def test_types_are_checked_in_the_whole_package_and_in_the_studies():
     checks = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mypy"]
-    assert checks == {"packages": ["backdrive_bayes"], "ignore_missing_imports": True}
+    everywhere = {"files": ["backdrive_bayes", "studies"], "mypy_path": "studies", "explicit_package_bases": True}
+    assert checks == everywhere | {"ignore_missing_imports": True}
