@@ -92,6 +92,7 @@ def against_dense(problem: Problem, draws) -> np.ndarray:
         log_scale = problem.mode.copy()
         log_scale[scales.free] = point
         scale = scales.of_weights(log_scale)
+        # Degrees of freedom need not be whole, whatever the library's stubs say.
         dense = multivariate_t.logpdf(y, None, noise + (x * scale**2) @ x.T, problem.data.noise_dof)  # type: ignore[arg-type]
         compressed = small.log_marginal(np.exp(log_scale)[turned.group])
         rows.append((problem.data.log_marginal(scale) - dense, compressed - dense))

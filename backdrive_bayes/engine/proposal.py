@@ -17,20 +17,21 @@ LEAST_LOG = -50.0
 POWERS = (1.0, 0.25, 0.0625)
 """Powers of the slices for the first points: two and four times as wide, they find shoulders far from the mode."""
 BATCH = 256
-"""Points from which one proposal learns at a time."""
+"""Points at which each first or learnt proposal is tried: they tell an efficiency of a half to a sixteenth of it."""
 EFFICIENT = 0.5
 """Efficiency that is enough: 400 effective draws then take a thousand."""
 LEARNT = 12
 """How often the proposal learns before sampling at most; units whose scales trade for each other want up to eight."""
 BETTER = 1.1
-"""Ratio of efficiencies that is worth to begin anew."""
+"""Ratio of efficiencies that is worth to begin anew: less is the error of the two."""
 COMPONENTS, DOF, ROUNDS = 3, 8.0, 12
 """Student-t components of a learnt proposal, their degrees of freedom, and rounds of expectation and maximisation. One holds a
 single peak; two of three a peak and its shoulder; six or ten are no better."""
 NARROW = 0.5
-"""Width of a component that no points speak for, in standard deviations of all points."""
+"""Width of a component that no points speak for, in standard deviations of all points, with the weight of one point more than
+there are dimensions: components are parts of the whole."""
 WIDE, FAR = 2.0, 0.1
-"""Width and share of the Student-t that proposes beyond what was found."""
+"""Width and share of the Student-t that proposes beyond what was found: its share is what it may cost of the efficiency."""
 
 
 class Proposal:
@@ -101,8 +102,8 @@ class Proposal:
         log = self.log_target - logsumexp(own + share, axis=0)
         total = logsumexp(log)
         self.weight = np.exp(log - total)
-        ratio = np.exp(np.minimum(self.log_target - own - (total - np.log(len(log))), -LEAST_LOG))
-        self.efficiency = 1.0 / (ratio @ self.weight)
+        # The mean of target over proposal under the target, whose normalisation the same points tell.
+        self.efficiency = np.exp(2.0 * total - np.log(len(log)) - logsumexp(self.log_target - own + log, axis=1))
 
     def _learn(self):
         """Add the proposal that the weighted points ask for."""

@@ -89,15 +89,10 @@ def sample_density(target, centre: np.ndarray, root: np.ndarray, names, seed: in
 def _ensembles(target, centre, root, names, seed, note):
     """Independent ensembles that have run until they converged or the budget was spent, and their convergence."""
     randoms = [np.random.RandomState(np.random.SeedSequence([seed, k]).generate_state(4)) for k in range(ENSEMBLES + 1)]
-    proposal, spent, samplers = Proposal(target, centre, root, randoms.pop()), 0, []
+    proposal = Proposal(target, centre, root, randoms.pop())
+    samplers, states = _begun(target, proposal, [random.get_state() for random in randoms])
+    spent, steps = 0, FIRST_STEPS
     while True:
-        if not samplers:
-            moves = [(_Independence(proposal), INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)]
-            samplers = [emcee.EnsembleSampler(WALKERS, len(names), target, moves=moves, vectorize=True) for _ in randoms]
-            points, log_prob = proposal.starts(ENSEMBLES * WALKERS)
-            parts = zip(np.split(points, ENSEMBLES), np.split(log_prob, ENSEMBLES), randoms, strict=True)
-            states = [emcee.State(x, log_prob=p, random_state=random.get_state()) for x, p, random in parts]
-            steps = FIRST_STEPS
         states = [s.run_mcmc(x, steps, skip_initial_state_check=True) for s, x in zip(samplers, states, strict=True)]
         chains = [s.get_chain() for s in samplers]
         values = np.stack([c.transpose(1, 0, 2).reshape(-1, len(names)) for c in chains])
@@ -107,11 +102,19 @@ def _ensembles(target, centre, root, names, seed, note):
         note(f"{target.evaluations} evaluations: {convergence.line()}")
         if convergence.converged or spent >= MOST_STEPS:
             return samplers, convergence
-        if proposal.improve():
-            for random, state in zip(randoms, states, strict=True):
-                random.set_state(state.random_state)
-            samplers = []
         steps = max(FIRST_STEPS, length // 2)
+        if proposal.improve():
+            samplers, states = _begun(target, proposal, [state.random_state for state in states])
+            steps = FIRST_STEPS
+
+
+def _begun(target, proposal, random_states):
+    """Samplers and states of ensembles at points like draws of the target."""
+    moves = [(_Independence(proposal), INDEPENDENT), (DEMove(), 1.0 - INDEPENDENT)]
+    points, log_prob = proposal.starts(len(random_states) * WALKERS)
+    parts = zip(np.split(points, len(random_states)), np.split(log_prob, len(random_states)), random_states, strict=True)
+    states = [emcee.State(x, log_prob=p, random_state=random) for x, p, random in parts]
+    return [emcee.EnsembleSampler(WALKERS, points.shape[1], target, moves=moves, vectorize=True) for _ in states], states
 
 
 def _thin(drawn):
