@@ -40,7 +40,7 @@ def read_result(path: Path, schema: str) -> dict:
         loaded = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise BadInput(path, "a result file", "no such file") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise BadInput(path, "a JSON result file", f"unreadable file ({type(error).__name__})") from None
     found = loaded.get("schema") if isinstance(loaded, dict) else None
     if found != schema:

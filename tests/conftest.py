@@ -2,6 +2,7 @@
 
 import gzip
 import os
+import signal
 import subprocess
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import pytest
 
 SHARED = Path(__file__).resolve().parents[1] / ".." / "shared"
 os.environ["COLUMNS"] = "120"
+# A shell that runs the tests in the background has them ignore Ctrl-C, and so would every command that they start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 FULL_CYCLE = (0.0, 1.0, -1.0, 1.0)
 
 

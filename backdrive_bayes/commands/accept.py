@@ -56,32 +56,33 @@ def run(args) -> int:
         require_out(args.out)
     others, probabilities = _models(args.model)
     batch, batch_units = _batch(args.batch)
-    if is_result(args.unit):
-        made, evidence, out = None, Evidence.read(args.unit), args.out or args.unit
-        repeat_findings(evidence.name, evidence.about)
-    else:
-        made, evidence, out = _fit(args, limits, options)
-    verdict = assess([evidence, *others], limits, probabilities, batch)
-    verdict |= collected([evidence.about])
-    named = {"limits": args.limits.name, "models": len(others) + 1, "batch": batch_units}
-    stamped_by(verdict, [evidence], **named)
-    if not made:
-        refuse_company(out, verdict)
-    with progress() as note, write_folder(out) as folder:
-        if made:
-            write_json(folder / "diagnosis.json", evidence.diagnosis)
-            posterior, indicators = made
-            keep_fit(posterior, indicators, folder, not args.no_figures, note)
-            retire(out, made[1])
-        write_json(folder / "verdict.json", verdict)
-        keep_run(folder, "accept", began)
-        if not args.no_figures:
-            draw_figures("verdict.json", folder)
+    with progress(*ACCEPT) as note:
+        if is_result(args.unit):
+            made, evidence, out = None, Evidence.read(args.unit), args.out or args.unit
+            repeat_findings(evidence.name, evidence.about)
+        else:
+            made, evidence, out = _fit(args, limits, options, note)
+        verdict = assess([evidence, *others], limits, probabilities, batch)
+        verdict |= collected([evidence.about])
+        named = {"limits": args.limits.name, "models": len(others) + 1, "batch": batch_units}
+        stamped_by(verdict, [evidence], **named)
+        if not made:
+            refuse_company(out, verdict)
+        with write_folder(out) as folder:
+            if made:
+                write_json(folder / "diagnosis.json", evidence.diagnosis)
+                posterior, indicators = made
+                keep_fit(posterior, indicators, folder, not args.no_figures, note)
+                retire(out, indicators)
+            write_json(folder / "verdict.json", verdict)
+            keep_run(folder, "accept", began)
+            if not args.no_figures:
+                draw_figures("verdict.json", folder)
     _summarise(verdict, evidence.about, out)
     return verdict["outcome"]["exit_code"]
 
 
-def _fit(args, limits, options):
+def _fit(args, limits, options, note):
     """Fit and diagnosis of a unit: posterior and indicators object, the evidence that they are, and where to write."""
     from dataclasses import replace
 
@@ -99,10 +100,9 @@ def _fit(args, limits, options):
     if len(wanted) > 1:
         raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))
     options = replace(options, k=wanted.pop()) if wanted else options
-    with progress(*ACCEPT) as note:
-        posterior, result = fit_unit(unit, options, note)
-        # What acts beside the model would shift every number that is judged.
-        diagnosis, _ = diagnose_unit(unit, options, note, sample=False)
+    posterior, result = fit_unit(unit, options, note)
+    # What acts beside the model would shift every number that is judged.
+    diagnosis, _ = diagnose_unit(unit, options, note, sample=False)
     ready.stamp(result)["notes"] += ready.lines
     evidence = replace(Evidence.of(posterior, result), diagnosis=ready.stamp(diagnosis))
     return (posterior, result), evidence, args.out or default_out(unit.name, "accept")

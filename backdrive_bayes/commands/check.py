@@ -45,7 +45,9 @@ def _summarise(result: dict) -> None:
         where = f"{finding['record']}: " if finding["record"] else ""
         say(f"  {finding['level']}: {where}{finding['text']}")
     outcome = result["outcome"]
-    say(f"{outcome['word'].upper()}, inference {'should not' if outcome['exit_code'] else 'may'} go on: {outcome['reason']}")
+    errors = sum(finding["level"] == "error" for finding in result["findings"])
+    why = f"{errors} error{'s'[: errors != 1]}" if errors else outcome["reason"]
+    say(f"{outcome['word'].upper()}, inference {'should not' if outcome['exit_code'] else 'may'} go on: {why}")
 
 
 def _extent(record: dict) -> str:

@@ -34,7 +34,7 @@ _SIMULATOR = (
     Stage("splitting the gap", 3.0),
 )  # fmt: skip
 DIAGNOSE_SIMULATED = (*_LOCATED, Stage("sampling the chosen model", 2.0), _SAMPLED, *_SIMULATOR, _TOLD, *_KEPT)
-ACCEPT = (*FIT, *_LOCATED)
+ACCEPT = (*FIT, *_LOCATED, *_KEPT)
 
 
 class Clock:

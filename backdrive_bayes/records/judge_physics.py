@@ -9,11 +9,12 @@ from backdrive_bayes.records.faults import stands_still
 from backdrive_bayes.records.findings import Finding
 from backdrive_bayes.records.lines import Line
 from backdrive_bayes.records.signs import inverted, not_answering
-from backdrive_bayes.records.wraps import LARGEST_STEP_RAD, TURN_RAD
+from backdrive_bayes.records.wraps import LARGEST_STEP_RAD
 
 _DEG = 180.0 / math.pi
 _OVERLOADED_TIMES, _UNTESTED_SHARE = 20.0, 0.01  # tested against rated torque: beyond these a unit or a column is wrong
-_MOST_TURNS = 0.5
+_LEAST_MOVED_RAD, _MOST_MOVED_RAD = 0.1 / 60.0 / _DEG, 30.0 / _DEG
+# Between the tips of a loop; a precise reducer gives way by an arcminute, a plastic one by ten degrees.
 FEWEST_SAMPLES = 60
 MOST_CYCLES = 2000
 
@@ -129,10 +130,16 @@ def _jumps(jumps, frozen):
 
 
 def _range(found):
-    turned = found["angle_signal_rad"] / TURN_RAD
-    if turned > _MOST_TURNS:
+    moved = found["angle_signal_rad"]
+    if not _LEAST_MOVED_RAD <= moved <= _MOST_MOVED_RAD:
         yield Finding(
             "warning",
             "angle_range",
-            f"the angle moves {turned:.3g} turns; with the input locked a reducer gives way by a small part of one: wrong unit?",
+            f"the angle moves {_size(moved)}; with the input locked, reducers give way by {_size(_LEAST_MOVED_RAD)} "
+            f"to {_size(_MOST_MOVED_RAD)}: wrong unit?",
         )
+
+
+def _size(angle_rad: float) -> str:
+    degrees = _DEG * angle_rad
+    return f"{degrees:.3g}°" if degrees >= 1.0 else f"{60.0 * degrees:.3g}′"

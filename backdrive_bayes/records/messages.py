@@ -8,6 +8,8 @@ from backdrive_bayes.number_text import with_error
 from backdrive_bayes.records.faults import held, stands_still
 from backdrive_bayes.records.findings import Finding
 
+_FEWEST_STEPS = 20  # of an encoder over a loop; with fewer a step spans as much as standing still
+
 
 def judge_record(found: dict, rated_torque_nm: float):
     """Findings on what ``check_record`` found of one record's channels, declared values and closure."""
@@ -43,11 +45,21 @@ def _channels(found, _):
         text = f"{channel} stands still for {frozen['samples']} samples from sample {frozen['start'] + 1}"
         text = f"{text} while {other} passes {frozen['other_share']:.0%} of its range"
         if stands_still(frozen):
-            yield Finding("error", "frozen", text)
+            coarse = _coarse(found) if channel == "angle" else ""
+            yield Finding("error", "coarse" if coarse else "frozen", coarse or text)
         elif held(frozen):
             yield Finding("warning", "held", f"{text}: its noise forbids that; it is held, not read, or clipped")
     if (found["angle_quantum_rad"] or 0.0) > found["noise"]["white_rad"]:
         yield Finding("note", "quantised", f"angle comes in steps of {_arcmin(found['angle_quantum_rad']):.3g}′")
+
+
+def _coarse(found):
+    """Words for an angle that stands still because its steps are too large to follow the loop, else none."""
+    step = found["angle_quantum_rad"]
+    steps = round(found["angle_range_rad"] / step) if step else _FEWEST_STEPS
+    if steps >= _FEWEST_STEPS:
+        return ""
+    return f"angle comes in {steps} step{'s'[: steps != 1]} of {_arcmin(step):.3g}′ only: the encoder is too coarse for this loop"
 
 
 def _plateaus(found, _):

@@ -75,7 +75,7 @@ def mechanism(saved) -> list:
         _by_record(saved, ["S_g [mJ]", "S_f [mJ]", "S_g/S [–]", "S_f/S [–]"], split),
         Note(
             f"{_interval(saved)} S_g and S_f: energy that the geometric error and friction dissipate in a cycle; what is left "
-            "of S is due to effects."
+            "of S is due to effects. A share below zero or above one means that the data do not tell the two apart."
         ),
     ]
 

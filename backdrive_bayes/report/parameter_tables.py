@@ -23,5 +23,8 @@ def parameters(saved) -> list:
 def meanings(saved) -> str:
     """What each of the parameters is, in one paragraph."""
     told = [f"{free(words(n))}: {free(about['definition'], 200)}" for n, about in saved.indicators["parameters"].items()]
-    note = "Parameters are read off each drawn operator; the prior is what the class implies for them before any data."
+    note = (
+        "Parameters are read off each drawn operator; the prior is what the class implies for them before any data. The class "
+        "does not forbid signs that no reducer has; where an interval reaches below zero, the data do not tell the size."
+    )
     return f"{note} {'; '.join(told)}."

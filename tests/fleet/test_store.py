@@ -1,5 +1,6 @@
 """The output folder: whole files or none, unreadable ones are as good as none, and one fleet at a time."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -93,6 +94,16 @@ def test_two_fleets_do_not_share_an_output(out):
         pass
     with locked(out):
         assert (out / LOCK).exists()
+
+
+def test_an_output_is_given_up_while_a_copy_of_its_handle_is_open(out):
+    """A worker that is being born inherits what its parent has open."""
+    with locked(out):
+        lock = str((out / LOCK).resolve())
+        (handle,) = [int(name) for name in os.listdir("/proc/self/fd") if os.path.realpath(f"/proc/self/fd/{name}") == lock]
+        copy = os.dup(handle)
+    with locked(out):
+        os.close(copy)
 
 
 def test_a_killed_fleet_gives_the_output_up_and_its_pieces_go(out):

@@ -119,6 +119,13 @@ def test_a_run_that_noise_makes_impossible_is_a_warning_and_a_coarse_encoder_is_
             assert result["may_infer"]
 
 
+def test_a_step_as_large_as_standing_still_is_called_coarse_and_not_frozen():
+    time, torque = ramps(noise=0.002)
+    result, _ = judged(time, torque, np.round(answer(torque) / (100.0 * ARCMIN)) * 100.0 * ARCMIN, noise=0.0)
+    said = texts(result, "error")
+    assert "angle comes in 2 steps of 100′ only" in said and "stands still" not in said
+
+
 def test_a_dwell_of_torque_and_angle_alike_is_no_fault_of_the_encoder():
     time, torque = ramps(noise=0.002)
     angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))

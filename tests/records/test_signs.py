@@ -100,6 +100,12 @@ def test_more_than_a_quarter_turn_between_samples_is_an_error():
     assert "angle_step" in codes("error", angle=3000 * ANGLE)
 
 
+@pytest.mark.parametrize("times, words", [(60.0, "203°"), (1.0 / 3437.75, "0.0591′")])
+def test_an_angle_in_another_unit_is_a_warning_with_what_reducers_do(times, words):
+    text = codes("warning", angle=times * ANGLE)["angle_range"]
+    assert words in text and "0.1′ to 30°: wrong unit?" in text
+
+
 @pytest.mark.parametrize("rated, words", [(1e-3, ["996 times", "0.001 N·m"]), (1e12, ["1/1e+12", "1e+12 N·m"])])
 def test_an_absurd_rated_torque_is_a_warning_with_both_numbers(rated, words):
     text = codes("warning", rated=rated)["rated_torque"]

@@ -66,6 +66,13 @@ def test_a_key_that_lacks_or_is_of_another_type_is_named(folder, name, path, val
     assert expected in str(refused.value) and name in str(refused.value)
 
 
+@pytest.mark.parametrize("text", ["9" * 5000, "[" * 200_000, "\udce4"], ids=["integer of 5000 digits", "deep", "no text"])
+def test_hostile_json_is_one_line(text, tmp_path):
+    (tmp_path / "r.json").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(BadInput, match="expected a JSON result file, found unreadable file"):
+        results.read_result(tmp_path / "r.json", results.CHECK)
+
+
 def test_keys_may_be_added(folder):
     result = json.loads((folder / "indicators.json").read_text()) | {"bench_log": {"temperature": 21}}
     require_whole(result, results.INDICATORS, "indicators.json")
