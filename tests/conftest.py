@@ -11,9 +11,12 @@ import pytest
 
 SHARED = Path(__file__).resolve().parents[1] / ".." / "shared"
 os.environ["COLUMNS"] = "120"
-# A shell that runs the tests in the background has them ignore Ctrl-C, and so would every command that they start.
-signal.signal(signal.SIGINT, signal.default_int_handler)
 FULL_CYCLE = (0.0, 1.0, -1.0, 1.0)
+
+
+def pytest_configure():
+    """A shell that runs the tests in the background has them ignore Ctrl-C, and so would every command that they start."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def ramps(knots=FULL_CYCLE, *, rate=1.0, hertz=200.0, dwell=0.0, limit=np.inf, noise=0.0, seed=0):
