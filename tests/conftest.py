@@ -88,3 +88,20 @@ def small_disk(tmp_path):
         pytest.skip(f"a file system of its own needs the right to mount ({made.stderr.strip()})")
     yield room, lambda: subprocess.run(["mount", "-o", "remount,ro", str(room)], check=True)
     subprocess.run(["umount", "-l", str(room)], check=True)
+
+
+@pytest.fixture(scope="module")
+def blank_pictures():
+    """For reports whose words are read: pictures keep their sizes and captions but are not drawn."""
+    from backdrive_bayes.figures import catalogue
+
+    def save(figure, path):
+        wide, high = 72.0 * figure.get_size_inches()
+        path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide:.2f}pt" height="{high:.2f}pt"/>', encoding="utf-8")
+        return path
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(catalogue, "save_svg", save)
+        for module in ("catalogue", "diagnosis"):
+            patch.setattr(f"backdrive_bayes.figures.{module}.settled", lambda figures: figures)
+        yield

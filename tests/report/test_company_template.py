@@ -19,6 +19,8 @@ from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.report import report
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "template"
 HOSTILE = "#strong[x] $x$ *b* _i_ `c` @ref S_g //"
 FIRST_PAGE = (

@@ -22,6 +22,8 @@ from backdrive_bayes.report.blocks import Chapter, Heading, Paragraph, Picture
 from backdrive_bayes.report.claims_section import _count, _number
 from backdrive_bayes.results import COMPARISON, read_result
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 ARCMIN = 10800 / 3.141592653589793
 HOSTILE = "#strong[x] $y$ *b* @ref"
 

@@ -11,6 +11,8 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.number_text import interval_text, probability_text, significant
 from backdrive_bayes.report import report
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 ARCMIN = 10800 / 3.141592653589793
 HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref // S_g"
 
@@ -36,7 +38,6 @@ def test_the_first_page_is_verdict_place_and_overview(made):
         "probability 0.998; fitted to all records, its smooth part: rms 1.24 arcmin, noise floor 0.107 arcmin",
         "records left out in turn: rms 1.24 arcmin before, 0.179 after, noise floor 0.107 arcmin",
         "interface slip, second backlash",
-        "Which effect?",
         "Signature",
     ):
         assert needed in pages[0], needed
@@ -116,8 +117,7 @@ def test_a_property_of_the_class_closes_nothing_and_is_not_judged_by_it(tmp_path
     for closed, told in ((None, False), (result["shrink"]["closed_fraction"], True)):
         write_diagnosis(tmp_path, 1, shrink=result["shrink"] | {"closed_fraction": closed, "records": records}, answer=answer)
         pages = pages_of(tmp_path)
-        assert "CAUSE NAMED" in pages[0] and ("part of the model class" in pages[0]) != told
-        assert ("Added to the model" in pages[0]) == told
+        assert "CAUSE NAMED" in pages[0] and ("Added to the model" in pages[0]) == told
         assert any("How far it shrinks" in p or "What it changes" in p for p in pages) == told
 
 
@@ -182,7 +182,6 @@ def test_many_records_and_a_pair_keep_the_summary_on_one_page(tmp_path):
     write_diagnosis(tmp_path, 8, answer=answer)
     pages = pages_of(tmp_path)
     assert "Signature" in pages[0] and "Rate dependent friction + viscoelastic creep" in pages[0]
-    assert "Which effect?" in pages[0] and "Where? (" in pages[0]
 
 
 def test_a_fit_and_a_diagnosis_in_one_folder_make_two_chapters(tmp_path):

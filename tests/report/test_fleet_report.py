@@ -8,6 +8,8 @@ from support.told import told
 from backdrive_bayes.commands.output import write_json
 from backdrive_bayes.fleet.summary import summarise
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 for library in ("typst", "matplotlib", "pypdf"):
     pytest.importorskip(library, reason="the report is made with the extra report and read with pypdf")
 UNITS, SHIFT = 30, 20

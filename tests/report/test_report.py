@@ -15,6 +15,8 @@ from backdrive_bayes.report.findings import warned
 from backdrive_bayes.report.overview import overview_blocks
 from backdrive_bayes.report.text import cut, free, printable, typeset
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 HOSTILE = "#strong[x] $x$ \\u{1F600} <script> *b* _i_ `c` @ref //"
 ARCMIN = 10800 / 3.141592653589793
 
@@ -122,16 +124,6 @@ def test_loads_are_shown_where_they_are_saved(tmp_path):
 
 def pages_of(*folders):
     return Pages(report.report_bytes(list(folders)))
-
-
-def test_figures_stay_text_and_vector(made):
-    pages = made[2]
-    assert "residual" in pages.text and "settled loop, rising" in pages.text
-    assert not any(page.images for page in pages.reader.pages)
-
-
-def test_the_same_results_give_the_same_bytes(made):
-    assert report.report_bytes([made[3]]) == made[1]
 
 
 def test_not_converged_is_inconclusive_with_advice(tmp_path):
