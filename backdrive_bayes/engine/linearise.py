@@ -34,8 +34,6 @@ CONSPICUOUS = 3.5
 REFINEMENTS = 3
 LEARNINGS = 4
 """How often the jitter is learnt at most: a prediction made with too little of it hides most of it."""
-FREE_PLAY = (-8.0, -4.5)
-"""Log scales of free play from which its mode is searched: hardly any, and as much as there is clearance."""
 STEPS = 14
 TRIAL_STEPS = 2
 LONGEST_STEP = 2e-3
@@ -156,8 +154,6 @@ class _Search:
             if weights is None:
                 design = class_groups(reduced, reducer, distortion).joined(*self.fixed)
                 weights = design.split(self._solve(reducer, design, reduced.angles, covariances, known)[2].mean)
-                # With other columns the scales may have another mode: they are searched anew.
-                known = {}
             linear = self._linear(reducer, distortion, weights, covariances, known, jitter, idle)
             known = linear.log_scale
             weights, before, idle = linear.weights, idle, idle | self._backward(linear)
@@ -209,18 +205,8 @@ class _Search:
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.trust)
         scales = design.scales(priors)
-        if known:
-            start = np.array([known.get(name, mean) for name, mean in zip(design.names, scales.mean, strict=True)])
-            return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean), 4)
-        # Steps near zero torque are free play or clearance: two modes, of which the better is taken.
-        found = []
-        for level in FREE_PLAY:
-            begin = scales.mean.copy()
-            if "free_play" in design.names:
-                begin[design.names.index("free_play")] = level
-            log_scale, solution = find_scales(data, scales, begin, 12)
-            found.append((solution.log_marginal + scales.log_prior(log_scale), log_scale, solution))
-        return data, *max(found, key=lambda f: f[0])[1:]
+        start = np.array([known.get(name, mean) for name, mean in zip(design.names, scales.mean, strict=True)])
+        return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean))
 
     def _acts(self, effect) -> bool:
         """Whether an effect may be more than a trace: all at the joint mode, none that bends where ``only`` is empty."""

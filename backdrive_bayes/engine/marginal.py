@@ -11,12 +11,12 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.linalg.lapack import dtrtri
+from scipy.linalg.lapack import dpotri, dtrtri
 
 LOG_SCALES = (-14.0, 2.5)
 """Range of log standard deviations of weights: beyond it nothing changes but rounding errors."""
-SWEEPS = 40
-"""Newton steps for the log scales at most; some ten are needed."""
+SWEEPS, LONGEST_STEP, SETTLED = 40, 1.0, 0.01
+"""Newton steps for the log scales at most, some seven are needed; the longest, and one so short that the mode is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,28 +186,54 @@ class Scales:
         return float(-0.5 * np.sum(((log_scale[free] - self.mean[free]) / self.sd[free]) ** 2))
 
 
-def find_scales(data: Whitened, scales: Scales, start=None, sweeps: int = SWEEPS) -> tuple[np.ndarray, Solution]:
-    """Mode of the log scales by damped Newton steps with MacKay's effective number of parameters for the curvature.
-
-    Source: MacKay, Neural Computation 4, 1992, 415-447.
-    """
+def find_scales(data: Whitened, scales: Scales, start=None) -> tuple[np.ndarray, Solution]:
+    """Mode of the log scales by Newton steps with the exact Hessian; the curvature is at least the prior's."""
     log_scale = np.array(scales.mean if start is None else start, float)
-    free, group, dof = scales.free, scales.group, data.moments.dof
-    precision = np.where(free, 1.0 / np.where(free, scales.sd, 1.0) ** 2, 0.0)
-    held = ~free[group]
-    known, group = Known.of(data.moments, held, scales.of_weights(log_scale)[held]), group[~held]
-    count = np.bincount(group, minlength=free.size)
-    for _ in range(sweeps):
-        lower, seen, chi2 = known.left.factor(scales.of_weights(log_scale)[~held])
-        inverse = dtrtri(lower, lower=1, overwrite_c=1)[0]
-        size = np.bincount(group, (seen @ inverse) ** 2, free.size) * dof / (data.noise_dof + chi2)
-        learnt = count - np.bincount(group, np.einsum("ij,ij->j", inverse, inverse), free.size)
-        gradient = size - learnt - precision * (log_scale - scales.mean)
-        step = np.where(free, np.clip(gradient / (size + learnt + precision + 1e-9), -1.0, 1.0), 0.0)
-        log_scale = np.clip(log_scale + step, *LOG_SCALES)
-        if np.abs(step).max() < 0.01:
+    held = ~scales.free[scales.group]
+    known, group = Known.of(data.moments, held, scales.of_weights(log_scale)[held]).left, scales.group[~held]
+    # Weights of one scale stand side by side.
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    at = group[first]
+    mean, precision = scales.mean[at], 1.0 / scales.sd[at] ** 2
+    for _ in range(SWEEPS if at.size else 0):
+        gradient, curvature = _slopes(known, scales.of_weights(log_scale)[~held], first)
+        gradient -= precision * (log_scale[at] - mean)
+        # A scale that is pressed against the end of its range stays there.
+        end = np.where(gradient > 0, LOG_SCALES[1], LOG_SCALES[0])
+        inside = np.abs(log_scale[at] - end) > SETTLED
+        value, vector = np.linalg.eigh((curvature + np.diag(precision))[np.ix_(inside, inside)])
+        step = vector @ (vector.T @ gradient[inside] / np.maximum(np.abs(value), precision.min()))
+        step *= min(1.0, LONGEST_STEP / max(np.abs(step).max(initial=0.0), SETTLED))
+        log_scale[at[inside]] = np.clip(log_scale[at[inside]] + step, *LOG_SCALES)
+        if np.abs(step).max(initial=0.0) < SETTLED:
             break
     return log_scale, data.solve(scales.of_weights(log_scale))
+
+
+def _slopes(moments: Moments, scale, first) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (scales,) and negative Hessian (scales, scales) of the log marginal likelihood by the log scales of weights that
+    stand side by side from the places ``first`` on.
+
+    With M the covariance and m the mean of the weights over their ``scale``, dM/ds_j = -[M D_j (1 - M) + (1 - M) D_j M] and
+    dm/ds_j = (2 M - 1) D_j m, D_j choosing the weights of scale j; the gradient is MacKay's (Neural Computation 4, 1992, 415).
+    """
+    lower, seen, chi2 = moments.factor(scale)
+    mean = solve_triangular(lower, seen, lower=True, trans=1, check_finite=False)
+    inverse = dpotri(lower, lower=1, overwrite_c=1)[0]  # its lower half, the other is zero
+    own = np.diag(inverse)
+
+    def by_scales(matrix):
+        """Sums over the blocks of a symmetric matrix of which the lower half is given."""
+        half = np.add.reduceat(np.add.reduceat(matrix, first, axis=0), first, axis=1)
+        return half + half.T - np.diag(np.add.reduceat(np.diag(matrix), first))
+
+    share = moments.dof / (moments.noise_dof + chi2)
+    squares, left = np.add.reduceat(mean**2, first), np.add.reduceat(own, first)
+    count = np.diff(first, append=scale.size)
+    bent = 4.0 * by_scales(inverse * mean * mean[:, None]) - 2.0 * np.diag(squares)
+    hessian = share * bent + 2.0 * share**2 / moments.dof * np.outer(squares, squares)
+    hessian -= 2.0 * (np.diag(left) - by_scales(inverse**2))
+    return share * squares - (count - left), -hessian
 
 
 def whiten(columns, angles, covariances, noise_dof: float, trust=None) -> Whitened:
