@@ -15,11 +15,16 @@ _TELLING = re.compile("|".join((*EFFECTS, *find_bench(DEFAULT_BENCH).unlisted, "
 _UNIT_FILES = re.compile(r"unit\.toml|\d+-rate-[^/]*\.csv\.gz")
 
 
-def publish(out: Path, sha256: str) -> None:
-    """Write the key's hash before any diagnosis; BadInput where another one, or an answer, was there first."""
+def refuse_early_answers(out: Path) -> None:
+    """Raise BadInput where an answer was there before the key's hash."""
     path = Path(out) / HASH
     if not path.exists() and any((Path(out) / ANSWERS).rglob("*.json")):
         raise BadInput(path, "the key's hash before the first answer", "answers without one: take a new OUT")
+
+
+def publish(out: Path, sha256: str) -> None:
+    """Write the key's hash before any diagnosis; BadInput where another one was there first."""
+    path = Path(out) / HASH
     if not path.exists():
         path.write_text(f"{sha256}  {KEY.as_posix()}\n", encoding="ascii")
     elif published(out) != sha256:

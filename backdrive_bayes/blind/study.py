@@ -61,6 +61,9 @@ def run_study(study: Study) -> dict:
 
 def _sealed_key(study):
     """Draw all units and publish the hash of their key, which stays in this process's memory."""
+    # What is refused is refused before hours of drawing.
+    seal.refuse_early_answers(study.out)
+    seal.refuse_leaks(study.out)
     units = study.out / seal.UNITS
     units.mkdir(parents=True, exist_ok=True)
     calls = {unit_name(i): (study.request, i, effects, units) for i, effects in enumerate(assignments(study.request))}
