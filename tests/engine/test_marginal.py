@@ -8,7 +8,7 @@ from scipy.linalg import block_diag, null_space
 from scipy.stats import invgamma, multivariate_normal, multivariate_t
 
 from backdrive_bayes.engine.contrasts import Contrasts
-from backdrive_bayes.engine.marginal import Scales, Whitened, find_scales, whiten
+from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, Whitened, _slopes, find_scales, whiten
 
 SIZES, WEIGHTS, DOF = (30, 22), 9, 25.0
 GROUP = np.repeat([0, 1, 2], 3)
@@ -165,6 +165,31 @@ def test_the_mode_of_the_scales_is_a_maximum(start):
         assert all(height(data, scales, mode + s * np.eye(2)[k]) < top for s in (-0.2, 0.2))
     away = mode + np.array([0.5, 0.0])
     assert abs(height(data, scales, away + 1e-4) - height(data, scales, away - 1e-4)) / 2e-4 > 0.03
+
+
+@pytest.mark.parametrize("log_scale", [(-0.4, -1.2), (1.0, -4.0)])
+def test_slopes_of_the_density_are_those_of_difference_quotients(log_scale):
+    data, scales = small_problem()
+    flat, step = replace(scales, sd=np.full(2, np.inf)), 1e-3 * np.eye(2)
+
+    def slope(at):
+        ends = [height(data, flat, at + sign * step[k]) for k in range(2) for sign in (1, -1)]
+        return np.array([ends[0] - ends[1], ends[2] - ends[3]]) / 2e-3
+
+    gradient, curvature = _slopes(data.moments, scales.of_weights(np.array(log_scale)), np.array([0, 3]))
+    np.testing.assert_allclose(gradient, slope(np.array(log_scale)), atol=1e-4)
+    quotients = [(slope(log_scale - step[k]) - slope(log_scale + step[k])) / 2e-3 for k in range(2)]
+    np.testing.assert_allclose(curvature, quotients, atol=1e-3)
+
+
+def test_a_scale_that_is_pressed_against_its_range_ends_the_search_all_the_same():
+    """Data that ask for scales without bound: the mode lies at the end, and the other scale is at its own maximum."""
+    data, scales = small_problem()
+    loud = Whitened(data.x, 1e4 * data.y, 24, 1e9)
+    mode, _ = find_scales(loud, replace(scales, sd=np.full(2, 1e3)))
+    assert mode.max() == LOG_SCALES[1]
+    again, _ = find_scales(loud, replace(scales, sd=np.full(2, 1e3)), mode)
+    np.testing.assert_allclose(again, mode, atol=0.01)
 
 
 def test_a_fixed_scale_stays_where_it_is():
