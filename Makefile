@@ -16,7 +16,7 @@ demo: $(VENV)/ready
 	cp reports/demo/reducer-1/figures/loop-2.png reports/demo/loop.png
 
 test: $(VENV)/ready
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 docs: $(VENV)/ready
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs

@@ -11,12 +11,21 @@ import pytest
 
 SHARED = Path(__file__).resolve().parents[1] / ".." / "shared"
 os.environ["COLUMNS"] = "120"
+LONGEST_FIRST = ("test_api.py", "fleet", "gap", "blind", "engine", "figures", "report", "pooling", "commands", "bench")
+"""Files and folders of tests in the order in which they are begun: no core is to wait for a long one at the end."""
 FULL_CYCLE = (0.0, 1.0, -1.0, 1.0)
 
 
 def pytest_configure():
     """A shell that runs the tests in the background has them ignore Ctrl-C, and so would every command that they start."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items):
+    """The longest first; those of one file stay together."""
+    order = {name: place for place, name in enumerate(LONGEST_FIRST)}
+    tests = Path(__file__).parent
+    items.sort(key=lambda item: order.get(item.path.relative_to(tests).parts[0], len(order)))
 
 
 def ramps(knots=FULL_CYCLE, *, rate=1.0, hertz=200.0, dwell=0.0, limit=np.inf, noise=0.0, seed=0):
