@@ -60,7 +60,7 @@ def unit_folder(tmp_path):
     """A valid unit of one record; tests spoil one thing of it."""
     folder = tmp_path / "unit"
     folder.mkdir()
-    time, torque = ramps(noise=0.002)
+    time, torque = ramps(noise=0.01)
     angle = answer(torque) * 10800 / np.pi + 0.1 * np.random.default_rng(1).normal(size=len(time))
     write_csv(folder / "a.csv", time, torque, angle)
     (folder / "unit.toml").write_text(

@@ -80,7 +80,7 @@ def units(tmp_path_factory):
     folders = []
     for name, compliance in (("a", 0.01), ("b", 0.02)):
         folder = tmp_path_factory.mktemp(name)
-        time, torque = ramps(noise=0.002)
+        time, torque = ramps(noise=0.01)
         rng = np.random.default_rng(len(name))
         angle = answer(torque, compliance=compliance) * 10800 / np.pi + 0.1 * rng.normal(size=len(time))
         write_csv(folder / "a.csv", time, torque, angle)
