@@ -48,6 +48,8 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, help="folder for README.md (default: none is written)")
     options = parser.parse_args()
+    # A shell that runs this in the background has it ignore Ctrl-C, and so would every verb.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     rng, rows = np.random.default_rng(options.seed), []
     with tempfile.TemporaryDirectory(prefix="kills-") as room:
         for verb in _verbs(Path(room)):
