@@ -41,7 +41,8 @@ def read_result(path: Path, schema: str) -> dict:
     except FileNotFoundError:
         raise BadInput(path, "a result file", "no such file") from None
     except (OSError, ValueError, RecursionError) as error:
-        raise BadInput(path, "a JSON result file", f"unreadable file ({type(error).__name__})") from None
+        why = "nested too deeply" if isinstance(error, RecursionError) else type(error).__name__
+        raise BadInput(path, "a JSON result file", f"unreadable file ({why})") from None
     found = loaded.get("schema") if isinstance(loaded, dict) else None
     if found != schema:
         raise BadInput(path, f"schema '{schema}'", repr(found))
