@@ -6,7 +6,7 @@ import numpy as np
 
 from backdrive_bayes.engine.design import class_priors
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.traces import trace_of
+from backdrive_bayes.engine.traces import trace_of, usual_of
 from backdrive_bayes.mechanics.registry import all_effects
 
 PRESENT_SD = 1.0
@@ -19,7 +19,7 @@ def levels(linear: Linear, hypothesis: tuple[str, ...]) -> dict[str, tuple[float
     present = {t.name for n in hypothesis for t in all_effects().get(n, ())}
     for effect in linear.effects:
         on = effect.name in present
-        level = effect.present(linear.reduced.context) if on else trace_of(linear, effect)
+        level = usual_of(linear, effect) if on else trace_of(linear, effect)
         priors[effect.name] = (float(np.log(level)), PRESENT_SD if on else 0.0)
     for name in linear.design.names:
         priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))

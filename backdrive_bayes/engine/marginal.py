@@ -187,7 +187,7 @@ class Scales:
 
 
 def find_scales(data: Whitened, scales: Scales, start=None) -> tuple[np.ndarray, Solution]:
-    """Mode of the log scales by Newton steps with the exact Hessian; the curvature is at least the prior's."""
+    """Mode of the log scales by Newton steps with the exact Hessian; the curvature is at least that of the widest prior."""
     log_scale = np.array(scales.mean if start is None else start, float)
     held = ~scales.free[scales.group]
     known, group = Known.of(data.moments, held, scales.of_weights(log_scale)[held]).left, scales.group[~held]

@@ -1,4 +1,4 @@
-"""How large the trace of an effect may be on this unit."""
+"""How large an effect may be on this unit where it is a mere trace, and how large it usually is where it acts."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import numpy as np
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.mechanics.effect import GrowthEffect
 
-HEIGHT = 0.3
-"""Standard deviations of the noise by which a trace may move the angle where it acts most."""
+HEIGHT = 0.15
+"""Standard deviations of the noise by which a trace of a law of the rate may move the angle where it acts most."""
+ABOVE = 10.0
+"""An effect that acts is usually as many times a trace, or it could not be told from one."""
 
 
 def trace_of(linear: Linear, effect) -> float:
@@ -25,3 +27,8 @@ def trace_of(linear: Linear, effect) -> float:
     z = np.concatenate(heights)
     height = np.sqrt(np.sum(z**4) / max(np.sum(z**2), 1e-300))
     return float(max(own, HEIGHT / max(height, 1e-12)))
+
+
+def usual_of(linear: Linear, effect) -> float:
+    """Usual standard deviation of an effect's weights where it acts: its own, or ABOVE traces if that is more."""
+    return max(effect.present(linear.reduced.context), ABOVE * trace_of(linear, effect))

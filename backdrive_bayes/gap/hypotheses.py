@@ -16,7 +16,7 @@ from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import AMPLITUDE, COARSE, fine_bank, wave_group, with_wave
 from backdrive_bayes.engine.reduced import disturbance
-from backdrive_bayes.engine.traces import trace_of
+from backdrive_bayes.engine.traces import trace_of, usual_of
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
 from backdrive_bayes.mechanics.effect import TangentEffect
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
@@ -28,8 +28,6 @@ MODULE_CHANGE = 0.05
 KINDS = (UNEXPLAINED, "module_change", "uneven", "step", "line")
 """What something unlisted may be: a process on each leg, a module that changes in time, legs of two directions that part, a step
 in time, a line in the spectrum of the noise; each as likely."""
-PAIRED = 6
-"""Effects that are tried in pairs: those that explain most alone, and the first of them with every other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +58,7 @@ class Weighed:
 
 
 def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
-    """Weigh none, every effect and the pairs of the most promising about every mode; ``allowed`` restricts the names."""
+    """Weigh none, every effect and every pair about every mode; ``allowed`` restricts the names."""
     jumps = find_jumps(linears[0])
     line = disturbance(linears[0].reduced)
     tables = [_Table(linear, jumps, line) for linear in linears]
@@ -73,15 +71,14 @@ def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
         return max(found), int(np.argmax(found))
 
     found = {h: best_mode(h) for h in [(), *((n,) for n in names)]}
-    order = sorted(names, key=lambda n: -found[(n,)][0])
-    pairs = {tuple(sorted(p)) for p in (*itertools.combinations(order[:PAIRED], 2), *((order[0], n) for n in order[1:]))}
+    pairs = list(itertools.combinations(sorted(names), 2))
     none, beside = found[()][0], jumps
     # An encoder's wave and teeth are not to speak for both from the same leaps.
     if (ENCODER, STICK_SLIP) in pairs and max(found[(ENCODER,)][0] - none, jumps.log_factor) > 0:
         beside = find_jumps(linears[0], tables[0].frequency[(ENCODER,)])
         for table in tables:
             table.jumping[True] = _traces(beside)
-    found |= {h: best_mode(h, beside if ENCODER in h else jumps) for h in sorted(pairs)}
+    found |= {h: best_mode(h, beside if ENCODER in h else jumps) for h in pairs}
     return Weighed(
         tuple(linears),
         {h: mode for h, (_, mode) in found.items()},
@@ -115,11 +112,11 @@ class _Table:
         unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
         self.linear, self.contrasts = linear, make_contrasts(linear, (*effect_groups(linear), *unlisted))
         self.waved = self.contrasts.joined(make_contrasts(linear, (waves,)))
-        contrasts, context = self.contrasts, linear.reduced.context
+        contrasts = self.contrasts
         effects = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}
         self.names = contrasts.names
         self.trace = np.array([trace_of(linear, effects[n]) if n in effects else 0.0 for n in self.names])
-        usual = {n: e.present(context) for n, e in effects.items()} | {"module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
+        usual = {n: usual_of(linear, e) for n, e in effects.items()} | {"module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
         self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gamma, logsumexp
 
-UNKNOWN, WAVE = "unknown", "encoder_error"
+UNKNOWN, WAVE, STICK_SLIP = "unknown", "encoder_error", "stick_slip"
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def probabilities(
 
 def _weights(log_factor, left, temperature, calibration) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects and of the same with something unlisted beside, without the operator's properties."""
-    weight, least = {}, min(left.values())
+    weight, misfit = {}, _misfits(log_factor, left, calibration)
     for effects, value in log_factor.items():
         if UNKNOWN in effects:
             continue
@@ -79,12 +79,21 @@ def _weights(log_factor, left, temperature, calibration) -> dict[tuple[str, ...]
         weight[effects] = value / temperature + prior
         more = tuple(sorted((*effects, UNKNOWN)))
         # Something unlisted alone is due where no listed effect explains, not where none does.
-        misfit = log_misfit(left[effects] if effects else least, calibration.spread)
+        due = misfit[effects] if effects else min(misfit.values())
         unlisted_prior = calibration.beside if effects else calibration.unlisted
         explained = max(log_factor.get(more, value), value)
-        weight[more] = explained / temperature + prior + unlisted_prior + misfit
+        weight[more] = explained / temperature + prior + unlisted_prior + due
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
+
+
+def _misfits(log_factor, left, calibration) -> dict[tuple[str, ...], float]:
+    """Log Bayes factor of something unlisted beside each set of listed effects, from what the set leaves."""
+    found = {effects: log_misfit(value, calibration.spread) for effects, value in left.items()}
+    if log_factor.get((STICK_SLIP,), 0.0) > 0.0:
+        # Teeth that were found scatter the block means themselves: more than noise is due.
+        found |= {effects: min(value, 0.0) for effects, value in found.items() if STICK_SLIP in effects}
+    return found
 
 
 def log_misfit(left: float, spread: float) -> float:
@@ -99,11 +108,12 @@ def log_misfit(left: float, spread: float) -> float:
 
 
 def _beside(joint, name, probability, calibration):
-    """Every set with and without a property of the operator; beside another effect it is rarer, as any second effect is."""
+    """Every set with and without a property of the operator, whose ``probability`` is that of a single effect: beside another its
+    prior is that of a second one."""
     found: dict[tuple[str, ...], float] = {}
     odds = probability / (1.0 - probability)
     for effects, weight in joint.items():
-        here = odds * np.exp(calibration.second) if effects else odds
+        here = odds * np.exp(calibration.second - calibration.single) if effects else odds
         more = tuple(sorted((*effects, name)))
         found[effects] = found.get(effects, 0.0) + weight / (1.0 + here)
         found[more] = found.get(more, 0.0) + weight * here / (1.0 + here)

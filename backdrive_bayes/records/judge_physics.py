@@ -135,11 +135,11 @@ def _range(found):
         yield Finding(
             "warning",
             "angle_range",
-            f"the angle moves {_size(moved)}; with the input locked, reducers give way by {_size(_LEAST_MOVED_RAD)} "
-            f"to {_size(_MOST_MOVED_RAD)}: wrong unit?",
+            f"the angle moves {_angle_text(moved)}; with the input locked, reducers give way by {_angle_text(_LEAST_MOVED_RAD)} "
+            f"to {_angle_text(_MOST_MOVED_RAD)}: wrong unit?",
         )
 
 
-def _size(angle_rad: float) -> str:
+def _angle_text(angle_rad: float) -> str:
     degrees = _DEG * angle_rad
     return f"{degrees:.3g}°" if degrees >= 1.0 else f"{60.0 * degrees:.3g}′"

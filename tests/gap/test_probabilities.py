@@ -58,8 +58,24 @@ def test_what_is_left_speaks_for_something_unlisted():
 def test_a_property_stands_beside_the_rest():
     found = labels(answer(given_factors(), properties={"slip": 0.97}))
     assert next(iter(found)) == "slip"
-    rare = answer(given_factors(lag=80.0, both=80.0), properties={"slip": 0.5})
-    assert sum(p for h, p in rare.items() if "slip" in h) < 0.2, "beside another effect it is rarer"
+
+
+@pytest.mark.parametrize("bayes_factor", [1.0, 30.0])
+def test_a_property_beside_another_effect_has_the_prior_of_a_second_one(bayes_factor):
+    odds = bayes_factor * np.exp(log_prior(("slip",), CALIBRATION))
+    joint = answer(given_factors(lag=1e4, both=1e4), properties={"slip": odds / (1.0 + odds)})
+    second = np.exp(log_prior(("lag", "slip"), CALIBRATION) - log_prior(("lag",), CALIBRATION))
+    assert joint[("lag", "slip")] / joint[("lag",)] == pytest.approx(bayes_factor * second)
+
+
+def test_what_teeth_leave_does_not_speak_for_something_unlisted():
+    log = given_factors() | {("stick_slip",): 40.0}
+    listed = [h for h in log if "unknown" not in h]
+    quiet, rough = dict.fromkeys(listed, 1.0), dict.fromkeys(listed, 20.0)
+    assert unlisted(answer(log, rough)) < 0.1
+    assert unlisted(answer(given_factors(lag=40.0), rough)) > 0.5, "another effect that leaves as much is not all"
+    unseen = log | {("stick_slip",): -0.5, ("lag",): 40.0}
+    assert unlisted(answer(unseen, rough)) > 0.5 > unlisted(answer(unseen, quiet)), "teeth that were not found leave nothing"
 
 
 def test_a_credible_set_holds_the_fewest_answers():
