@@ -19,8 +19,6 @@ SPREAD = 0.25
 STRAY = 1e-3
 """Share of instants at which something else moves the angle either way, by up to ``FAR`` noise standard deviations."""
 FAR = 6.0
-FAINT = 1e-9
-"""Probability below which a run is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,34 +88,48 @@ def _smooth(value, fresh, memory, sd):
     return found
 
 
+@numba.njit(cache=True, fastmath=True, inline="always")
+def _bell(start, step, out):
+    """exp(-(start + step k)² / 2) for every k, by products outward from the largest."""
+    top = 0
+    if step != 0.0:
+        top = int(min(max(np.rint(-start / step), 0.0), out.size - 1.0))
+    x, fall = start + step * top, np.exp(-step * step)
+    out[top] = np.exp(-0.5 * x * x)
+    value, factor = out[top], np.exp(-x * step) * np.sqrt(fall)
+    for k in range(top + 1, out.size):
+        value *= factor
+        factor *= fall
+        out[k] = value
+    value, factor = out[top], np.exp(x * step) * np.sqrt(fall)
+    for k in range(top - 1, -1, -1):
+        value *= factor
+        factor *= fall
+        out[k] = value
+
+
 @numba.njit(cache=True, fastmath=True)
 def _toothed(value, fresh, memory, sd, height, length, holds):
     first = np.ones(holds.size)
     for k in range(1, holds.size):
         first[k] = first[k - 1] * holds[k - 1]
     first /= first.sum()
-    now, then = first.copy(), np.zeros(holds.size)
-    found, stray, fall = 0.0, STRAY / FAR, height / length
+    now, then, on, back = first.copy(), np.zeros(holds.size), np.empty(holds.size), np.empty(holds.size)
+    found, known, stray, fall = 0.0, (1.0 - STRAY) / sd, STRAY / FAR, height / length
     for t in range(1, value.size):
         if fresh[t]:
             now[:] = first
             continue
         # The tooth's value is height / 2 - fall k; it goes on to k + 1, or leaps to k = 0.
-        top = value[t] - memory * value[t - 1] - 0.5 * height * (1.0 - memory)
+        top = (value[t] - memory * value[t - 1] - 0.5 * height * (1.0 - memory)) / sd
+        _bell(top + fall / sd, fall * (1.0 - memory) / sd, on)
+        _bell(top, -memory * fall / sd, back)
         total, leaps = 0.0, 0.0
-        for k in range(holds.size - 1, -1, -1):
-            weight = now[k]
-            if k + 1 < holds.size:
-                then[k + 1] = 0.0
-            if weight < FAINT:
-                continue
-            if holds[k] > FAINT:
-                left = (top + fall * (k * (1.0 - memory) + 1.0)) / sd
-                then[k + 1] = weight * holds[k] * ((1.0 - STRAY) * np.exp(-0.5 * left * left) / sd + stray)
-                total += then[k + 1]
-            if holds[k] < 1.0 - FAINT:
-                left = (top - memory * fall * k) / sd
-                leaps += weight * (1.0 - holds[k]) * ((1.0 - STRAY) * np.exp(-0.5 * left * left) / sd + stray)
+        for k in range(holds.size - 1):
+            then[k + 1] = now[k] * holds[k] * (known * on[k] + stray)
+            total += then[k + 1]
+        for k in range(holds.size):
+            leaps += now[k] * (1.0 - holds[k]) * (known * back[k] + stray)
         then[0] = leaps
         total += leaps
         found += np.log(total)

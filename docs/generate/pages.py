@@ -17,7 +17,7 @@ import numpy as np
 
 import backdrive_bayes.schemas
 from backdrive_bayes.commands.main import VERBS, main
-from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, reduced, sample
+from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, reduced, sample, traces
 from backdrive_bayes.gap import examine, probabilities, properties, shrink, simulator
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import reducer
@@ -48,6 +48,8 @@ NUMBERS = {
     "sure": f"{properties.SURE:g}",
     "usual_line": f"{lines.USUAL:g}",
     "highest_line": f"{lines.HIGHEST:g}",
+    "above": f"{traces.ABOVE:g}",
+    "trace_height": f"{traces.HEIGHT:g}",
 }
 """Constants of the code that the pages name."""
 _LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]+\)")

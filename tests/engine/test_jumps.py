@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.engine.jumps import SEEN, Teeth, even_series, weigh_teeth, without_wave
-from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
+from backdrive_bayes.engine.sawtooth import FAR, STRAY, Noise, Series, _holds, fit_noise, tooth_gain
 
 COUNT = 2000
 LEG = np.repeat([-1, 1, 2, 3], COUNT // 4)
@@ -72,6 +72,38 @@ def test_steep_places_and_short_runs_are_left_out():
     assert even_series(noise(), np.full(COUNT, -1), 1) is None
     assert even_series(noise(), LEG, 100) is None
     assert weigh_teeth([]).log_factor == 0.0
+
+
+def summed_over_runs(value, fresh, memory, sd, height, length):
+    """The filter's log likelihood from its definition: every run since the last leap goes on or leaps."""
+    holds, fall, found = _holds(length), height / length, 0.0
+    first = np.cumprod(np.r_[1.0, holds[:-1]])
+    now, runs = first / first.sum(), np.arange(holds.size)
+
+    def density(left):
+        return (1 - STRAY) * np.exp(-0.5 * (left / sd) ** 2) / sd + STRAY / FAR
+
+    for t in range(1, value.size):
+        if fresh[t]:
+            now = first / first.sum()
+            continue
+        before = 0.5 * height - fall * runs
+        rest = value[t] - memory * value[t - 1] + memory * before
+        on, leap = now * holds * density(rest - (before - fall)), now * (1 - holds) * density(rest - 0.5 * height)
+        now = np.r_[leap.sum(), on[:-1]]
+        found += np.log(now.sum())
+        now /= now.sum()
+    return found
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.6, 0.98])
+@pytest.mark.parametrize("height", [0.5, 2.5])
+@pytest.mark.parametrize("length", [4.0, 30.0])
+def test_the_filter_is_the_sum_over_all_runs(memory, height, length):
+    value, fresh = (noise(3) + teeth(2.0, 12.0))[:400], np.arange(400) % 150 == 0
+    told = tooth_gain(Series(value, fresh), Noise(memory, 0.5, 1.0, 0.0), memory, height, length)
+    assert told == pytest.approx(summed_over_runs(value, fresh, memory, 0.5, height, length), rel=1e-9)
+    assert told != pytest.approx(summed_over_runs(value, fresh, memory, 0.5, height, 1.1 * length), rel=1e-4), "a planted fault"
 
 
 def test_no_teeth_is_the_limit_of_low_teeth():
