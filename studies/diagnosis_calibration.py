@@ -1,7 +1,7 @@
 """Naming across benches: weigh labelled units, set the calibration on all benches but one, score it on that one.
 
     python studies/diagnosis_calibration.py weigh FOLDER NAME [--key KEY.json] [--workers 2] [--fresh]
-    python studies/diagnosis_calibration.py set
+    python studies/diagnosis_calibration.py set [--workers 2]
 
 FOLDER holds unit folders and a key as studies/make_bench.py writes them. ``weigh`` saves log Bayes factors, what each hypothesis
 leaves and the operator's properties to reports/diagnosis-calibration/NAME.json; ``set`` reads all of these, prints and writes the
@@ -78,8 +78,14 @@ def read_benches(home: Path = HOME) -> dict[str, list[dict]]:
     benches: dict[str, list[dict]] = {}
     for path in sorted(home.glob("*.json")):
         name = "foreign" if path.stem in ("set-1", "foreign-1") else path.stem
-        benches.setdefault(name, []).extend(json.loads(path.read_text()).values())
+        for row in json.loads(path.read_text()).values():
+            benches.setdefault(name, []).append(row | {k: _by_set(row[k]) for k in ("log_factor", "left") if k in row})
     return benches
+
+
+def _by_set(table) -> dict:
+    """A saved table by sets of effects."""
+    return {tuple(k.split("+")) if k else (): v for k, v in table.items()}
 
 
 def answers(row: dict, calibration: Calibration) -> dict[str, float]:
@@ -87,10 +93,7 @@ def answers(row: dict, calibration: Calibration) -> dict[str, float]:
     if "error" in row:
         return {"none": 0.0, "unknown": 0.0}
 
-    def tuples(table):
-        return {tuple(k.split("+")) if k else (): v for k, v in table.items()}
-
-    found = labels(probabilities(tuples(row["log_factor"]), tuples(row["left"]), row["properties"], calibration))
+    found = labels(probabilities(row["log_factor"], row["left"], row["properties"], calibration))
     likeliest = next(iter(found))
     return moved_to_unknown(found, likeliest) if row.get("unsupported") and row["named"] == likeliest else found
 
@@ -171,12 +174,10 @@ def scores(rows, calibration) -> dict[str, float]:
 def run_set(args) -> None:
     """Left-out scores and the calibration for all benches."""
     benches = read_benches()
-    table = {}
-    for name, rows in benches.items():
-        others = best_calibration([r for n, r in benches.items() if n != name])
-        table[name] = scores(rows, others)
-        print(name, {k: round(v, 2) for k, v in table[name].items()}, flush=True)
-    everything = best_calibration(list(benches.values()))
+    left_out = [[r for n, r in benches.items() if n != name] for name in benches]
+    with ProcessPoolExecutor(args.workers) as pool:
+        *others, everything = pool.map(best_calibration, [*left_out, list(benches.values())])
+    table = {name: scores(rows, found) for (name, rows), found in zip(benches.items(), others, strict=True)}
     print(everything)
     write_readme(table, everything, {n: scores(rows, CALIBRATION) for n, rows in read_benches(HOME / "fresh").items()})
 
@@ -226,7 +227,9 @@ def main() -> None:
     one.add_argument("--workers", type=int, default=1)
     one.add_argument("--fresh", action="store_true")
     one.set_defaults(run=run_weigh)
-    verbs.add_parser("set").set_defaults(run=run_set)
+    every = verbs.add_parser("set")
+    every.add_argument("--workers", type=int, default=1)
+    every.set_defaults(run=run_set)
     args = parser.parse_args()
     args.run(args)
 

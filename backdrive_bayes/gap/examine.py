@@ -15,13 +15,16 @@ from backdrive_bayes.gap import probabilities, where
 from backdrive_bayes.gap.averaged import weighed_unit, with_columns
 from backdrive_bayes.gap.hypotheses import STICK_SLIP, Weighed
 from backdrive_bayes.gap.properties import Property, find_properties
-from backdrive_bayes.gap.shrink import Fitted, Shrink, fit_hypothesis, shrink
+from backdrive_bayes.gap.shrink import Fitted, Shrink, fit_hypothesis, shrink, within_reach
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.records.record import Unit
 
 LEVEL = 0.9
 LEAST_CLOSED = 0.5
 """A name that closes less of the gap than this on held-out data, with all of its interval below, is unknown."""
+SEEN = 4.0
+"""Mean square of what the class leaves of held-out data, in that of the noise, from which on a name must close the gap: as much
+again as the noise in its root."""
 MODULE_ODDS = 3.0
 """Log odds of a module that every reducer has and the baseline was asked to do without."""
 
@@ -114,10 +117,15 @@ class Found:
 
     @cached_property
     def unsupported(self) -> bool:
-        """Whether the name explains too little of held-out data to be one."""
+        """Whether the name explains too little of held-out data to be one, where others predict these without extrapolating and
+        the gap is wider than the noise: a part of less is mostly that of the class."""
         names = set(self.named) - {p.name for p in self.properties} - {STICK_SLIP, "unknown", *self.withheld}
-        gap = probabilities.log_misfit(self.weighed.left[()], probabilities.CALIBRATION.spread) > 0
-        return bool(names) and gap and self.closed is not None and self.closed["hi"] < LEAST_CLOSED
+        folds = within_reach(self.linear)
+        closed = self.closed_of(folds) if names and folds else None
+        if closed is None:
+            return False
+        before, floor = (self.held_out.mean_square(part, folds) for part in ("before", "floor"))
+        return before > SEEN * floor and closed["hi"] < LEAST_CLOSED
 
     @property
     def answers(self) -> dict[str, float]:
@@ -154,11 +162,12 @@ class Found:
                         priors[part.name] = (-14.0, 0.0)
         return fit_hypothesis(linear, effects, priors)
 
-    def closed_of(self, fold=None) -> dict | None:
-        """Closed fraction of one fold or of all; None where only properties are named: the class holds them before and after."""
+    def closed_of(self, folds=None) -> dict | None:
+        """Closed fraction of one fold, several or all; None where only properties are named: the class holds them before and
+        after."""
         if self.named and set(self.named) <= {p.name for p in self.properties}:
             return None
-        return self.held_out.closed("after", self.rng, LEVEL, fold)
+        return self.held_out.closed("after", self.rng, LEVEL, folds)
 
 
 def moved_to_unknown(answers: dict[str, float], name: str) -> dict[str, float]:

@@ -59,7 +59,8 @@ def probabilities(
     something unlisted leaves, ``properties`` the probabilities of effects inside the class, each taken alone.
     """
     hottest = calibration.cool + calibration.warm * np.sqrt(max(0.0, *log_factor.values()))
-    found = [_weights(log_factor, left, max(hottest * t, 1.0), calibration) for t in TEMPERATURES]
+    misfit = _misfits(log_factor, left, calibration)
+    found = [_weights(log_factor, misfit, max(hottest * t, 1.0), calibration) for t in TEMPERATURES]
     joint = {h: float(np.mean([f[h] for f in found])) for h in found[0]}
     for name, p in properties.items():
         joint = _beside(joint, name, p, calibration)
@@ -69,9 +70,9 @@ def probabilities(
     return {h: w / total for h, w in joint.items()}
 
 
-def _weights(log_factor, left, temperature, calibration) -> dict[tuple[str, ...], float]:
+def _weights(log_factor, misfit, temperature, calibration) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects and of the same with something unlisted beside, without the operator's properties."""
-    weight, misfit = {}, _misfits(log_factor, left, calibration)
+    weight, least = {}, min(misfit.values())
     for effects, value in log_factor.items():
         if UNKNOWN in effects:
             continue
@@ -79,7 +80,7 @@ def _weights(log_factor, left, temperature, calibration) -> dict[tuple[str, ...]
         weight[effects] = value / temperature + prior
         more = tuple(sorted((*effects, UNKNOWN)))
         # Something unlisted alone is due where no listed effect explains, not where none does.
-        due = misfit[effects] if effects else min(misfit.values())
+        due = misfit[effects] if effects else least
         unlisted_prior = calibration.beside if effects else calibration.unlisted
         explained = max(log_factor.get(more, value), value)
         weight[more] = explained / temperature + prior + unlisted_prior + due

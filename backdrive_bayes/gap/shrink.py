@@ -15,6 +15,7 @@ from scipy.linalg import solve_triangular
 from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import Scales, find_scales, whiten
+from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 
 RESAMPLED = 400
 FEWEST_PIECES = 4
@@ -65,25 +66,28 @@ class Shrink:
     floor: np.ndarray
     error: np.ndarray
 
-    def mean_square(self, part: str, fold: int | None = None) -> float:
-        """Mean square [rad²] of one part in one fold, or over all of them."""
-        own = np.full(self.fold.size, True) if fold is None else self.fold == fold
+    def mean_square(self, part: str, folds=None) -> float:
+        """Mean square [rad²] of one part in one fold or several, or over all of them."""
+        own = self._pieces(folds)
         return float(getattr(self, part)[own].sum() / max(self.share[own].sum(), 1e-300))
 
-    def closed(self, part: str, rng, level: float, fold: int | None = None) -> dict:
+    def closed(self, part: str, rng, level: float, folds=None) -> dict:
         """Closed fraction of ``after`` or ``control`` with its central interval by a Bayesian bootstrap over folds and pieces, in
         which a right model's error of prediction is drawn too.
 
         Source: Rubin, Annals of Statistics 9, 1981. Of fewer than ``FEWEST_PIECES`` pieces there is none: both ends
         are the value.
         """
-        own = np.full(self.fold.size, True) if fold is None else self.fold == fold
+        own = self._pieces(folds)
         weight = resampled(self.fold[own], rng)
         share = weight @ self.share[own]
         before, left, floor = (weight @ getattr(self, name)[own] / share for name in ("before", part, "floor"))
         floor = floor + np.sum(weight * self.error[:, own], axis=1) / share
         fraction = closed_fraction(before, left, floor)
         return about_first(fraction, level, weight.shape[1])
+
+    def _pieces(self, folds):
+        return np.full(self.fold.size, True) if folds is None else np.isin(self.fold, folds)
 
 
 def resampled(fold, rng) -> np.ndarray:
@@ -141,6 +145,21 @@ def _folds(linear):
     settled = np.unique(legs[trusted])
     # A fold needs others to be predicted from.
     return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in settled} if settled.size > 1 else {"all": np.arange(legs.size)}
+
+
+def within_reach(linear: Linear) -> list[int]:
+    """Folds that the others predict without extrapolating: some other record is as slow, some as fast and some as large."""
+    rate = linear.reduced.context.rate
+    if rate.size == 1:
+        return list(range(len(_folds(linear))))
+    largest, found = np.array([np.abs(b.turning_nm).max() for b in linear.reduced.blocks]), []
+    for k in range(rate.size):
+        others = np.delete(np.arange(rate.size), k)
+        slower, faster = (any(same_rate(rate[o], rate[k]) or f(rate[o], rate[k]) for o in others) for f in (np.less, np.greater))
+        larger = any(same_amplitude(largest[o], largest[k]) or largest[o] > largest[k] for o in others)
+        if slower and faster and larger:
+            found.append(k)
+    return found
 
 
 def _held_out(fitted: Fitted, own, record) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from backdrive_bayes.engine.infer import library_terms
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.gap import examine, next_test, where
-from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink
+from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink, within_reach
 
 
 @cache
@@ -110,6 +110,50 @@ def test_held_out_records_are_every_record_in_turn():
     assert {int(f) for f in found.fold} == {0, 1}
     np.testing.assert_allclose([found.share[found.fold == f].sum() for f in (0, 1)], 1.0)
     assert found.mean_square("after") < found.mean_square("before")
+
+
+def run_at(rates, amplitudes):
+    """What `within_reach` sees of a unit with records of these rates and amplitudes."""
+    blocks = [SimpleNamespace(turning_nm=np.array([0.0, a, -a, a])) for a in amplitudes]
+    return SimpleNamespace(reduced=SimpleNamespace(context=SimpleNamespace(rate=np.array(rates)), blocks=blocks))
+
+
+@pytest.mark.parametrize(
+    ("rates", "amplitudes", "folds"),
+    [
+        ((1.0, 3.0, 9.0), (1.0, 1.0, 1.0), [1]),
+        ((1.0, 1.02, 0.99), (1.0, 1.0, 1.0), [0, 1, 2]),
+        ((1.0, 1.0, 1.0), (1.0, 0.5, 0.7), [1, 2]),
+        ((1.0, 9.0), (1.0, 1.0), []),
+        ((1.0, 1.0, 9.0, 9.0), (1.0, 1.01, 1.0, 0.4), [0, 1, 2, 3]),
+    ],
+)
+def test_records_within_reach_are_no_slower_faster_or_larger_than_the_others(rates, amplitudes, folds):
+    assert within_reach(run_at(rates, amplitudes)) == folds
+
+
+def test_the_legs_of_one_record_are_all_within_reach():
+    linear = joint_mode(reduce_unit(planted(0, loops=((0.1, 0.1),))), library_terms())
+    fitted, gap = fit_hypothesis(linear, (), levels(linear, ())), where.estimate_gap(linear, np.random.default_rng(0))
+    held = shrink(fitted, fitted, gap.weight, np.random.default_rng(1))
+    assert within_reach(linear) == list(range(len(held.names))) and len(held.names) >= 2
+
+
+@pytest.mark.parametrize(
+    ("rates", "before", "hi", "unsupported"),
+    [
+        ((1.0, 1.0), 9.0, 0.3, True),
+        ((1.0, 1.0), 9.0, 0.6, False),
+        ((1.0, 1.0), 3.0, 0.3, False),
+        ((1.0, 9.0), 9.0, 0.3, False),
+    ],
+    ids=["a wide gap stays open", "it may be closed", "the gap is narrower than the noise", "no record is within reach"],
+)
+def test_a_name_must_close_a_gap_that_is_seen_without_extrapolating(rates, before, hi, unsupported):
+    held = SimpleNamespace(mean_square=lambda part, folds: {"before": before, "floor": 1.0}[part])
+    found = SimpleNamespace(named=("torque_offset",), properties=(), withheld={}, linear=run_at(rates, (1.0, 1.0)), held_out=held)
+    found.closed_of = lambda folds: {"hi": hi}
+    assert examine.Found.unsupported.func(found) is unsupported
 
 
 def test_the_closed_fraction_has_its_ends():
