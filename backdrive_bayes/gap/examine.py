@@ -22,7 +22,7 @@ from backdrive_bayes.records.record import Unit
 LEVEL = 0.9
 LEAST_CLOSED = 0.5
 """A name that closes less of the gap than this on held-out data, with all of its interval below, is unknown."""
-SEEN = 4.0
+CLEAR_GAP = 4.0
 """Mean square of what the class leaves of held-out data, in that of the noise, from which on a name must close the gap: as much
 again as the noise in its root."""
 MODULE_ODDS = 3.0
@@ -125,7 +125,7 @@ class Found:
         if closed is None:
             return False
         before, floor = (self.held_out.mean_square(part, folds) for part in ("before", "floor"))
-        return before > SEEN * floor and closed["hi"] < LEAST_CLOSED
+        return before > CLEAR_GAP * floor and closed["hi"] < LEAST_CLOSED
 
     @property
     def answers(self) -> dict[str, float]:
