@@ -179,7 +179,10 @@ def run_set(args) -> None:
         *others, everything = pool.map(best_calibration, [*left_out, list(benches.values())])
     table = {name: scores(rows, found) for (name, rows), found in zip(benches.items(), others, strict=True)}
     print(everything)
-    write_readme(table, everything, {n: scores(rows, CALIBRATION) for n, rows in read_benches(HOME / "fresh").items()})
+    packaged, fresh = (
+        {n: scores(rows, CALIBRATION) for n, rows in found.items()} for found in (benches, read_benches(HOME / "fresh"))
+    )
+    write_readme(table, everything, packaged, fresh)
 
 
 def as_table(table) -> list[str]:
@@ -192,7 +195,7 @@ def as_table(table) -> list[str]:
     return lines
 
 
-def write_readme(table, calibration, fresh) -> None:
+def write_readme(table, calibration, packaged, fresh) -> None:
     """The result as a page."""
     lines = ["# Naming across benches", ""]
     lines += ["Each bench scored with the calibration that was set on all others (`studies/diagnosis_calibration.py set`).", ""]
@@ -206,7 +209,9 @@ def write_readme(table, calibration, fresh) -> None:
     ]
     kept = ", ".join(f"{f.name} {getattr(CALIBRATION, f.name):.2f}" for f in fields(CALIBRATION))
     lines += [
-        f"The package's defaults: {kept}.",
+        f"The package's defaults: {kept}. With them:",
+        "",
+        *as_table(packaged),
         "",
         UNSEEN,
         "",
