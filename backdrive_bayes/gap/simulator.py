@@ -17,6 +17,7 @@ from backdrive_bayes.gap import probabilities
 from backdrive_bayes.gap.averaged import posterior_of
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
+from backdrive_bayes.indicators.same_loop import same_rate
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
@@ -26,8 +27,6 @@ FINE = 400
 """Blocks a leg in which a simulator's own angle is taken along a path that it was asked."""
 NODES = (np.arange(5) + 0.5) / 5
 """Where in a block an angle is taken for its mean."""
-SAME_TORQUE, SAME_RATE = SLACK, 0.1
-"""Two paths are the same where turning torques differ by less than this share of the largest, and rates by less than that."""
 FEWEST, MOST = 2000, 400_000
 """Samples of a simulated record as the bench would have read it."""
 
@@ -54,10 +53,10 @@ class Simulator:
     def same_path(self, measured: Reduced, record: int) -> int | None:
         """Number of the simulator's record along the path of a measured one, None where it was not asked that path."""
         blocks, rate = measured.blocks[record], measured.context.rate[record] * measured.torque_scale_nm
-        least = SAME_TORQUE * np.abs(blocks.turning_nm).max()
+        least = SLACK * np.abs(blocks.turning_nm).max()
         for number, own in enumerate(self.reduced.blocks):
             theirs = self.reduced.context.rate[number] * self.reduced.torque_scale_nm
-            alike = own.turning_nm.size == blocks.turning_nm.size and abs(theirs / rate - 1.0) < SAME_RATE
+            alike = own.turning_nm.size == blocks.turning_nm.size and same_rate(theirs, rate)
             if alike and np.abs(own.turning_nm - blocks.turning_nm).max() < least:
                 return number
         return None

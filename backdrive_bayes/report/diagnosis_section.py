@@ -8,7 +8,6 @@ from pathlib import Path
 from backdrive_bayes.figures import diagnosis
 from backdrive_bayes.figures.catalogue import caption
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import label_words
 from backdrive_bayes.figures.style import words
 from backdrive_bayes.report import diagnosis_simulated as simulated
 from backdrive_bayes.report import diagnosis_tables as tables
@@ -62,7 +61,6 @@ def _identity(saved):
         *([("Simulator", free(saved.simulator.get("unit") or "not named", 80))] if saved.simulator else []),
         ("Records", _record_list(saved)),
         ("Gap", tables.gap_text(saved)),
-        ("90 % credible set", free(", ".join(label_words(e) for e in saved.credible_set) or "not given")),
     ]
     if saved.added:
         rows.append(("Held out", free(tables.held_out_text(saved))))
