@@ -77,16 +77,6 @@ def shared_data():
     return folder.resolve()
 
 
-@pytest.fixture(scope="session")
-def two_workers():
-    """A client of two worker processes on this machine."""
-    pytest.importorskip("distributed", reason="the extra fleet is not installed")
-    from backdrive_bayes.fleet import cluster
-
-    with cluster.local(2) as client:
-        yield client
-
-
 @pytest.fixture
 def small_disk(tmp_path):
     """A file system of 256 kB and a function that makes it read-only."""

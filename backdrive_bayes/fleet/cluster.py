@@ -31,7 +31,10 @@ SETTINGS = {
     # A worker holds the unit that it works on and no other, so that only this one is blamed where the worker dies.
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.worker.daemon": True,
-    "distributed.admin.tick.limit": "1h",  # a unit's seconds of algebra are no hanging event loop
+    # A unit's seconds of algebra are no hanging event loop; looking for one, and sampling where a worker is, takes a tenth of a core.
+    "distributed.admin.tick.limit": "1h",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.worker.profile.enabled": False,
 }
 
 

@@ -55,6 +55,14 @@ if __name__ == "__main__":
 """
 
 
+@pytest.fixture(scope="module")
+def two_workers():
+    """A client of two worker processes on this machine."""
+    pytest.importorskip("distributed", reason="the extra fleet is not installed")
+    with cluster.local(2) as client:
+        yield client
+
+
 @pytest.fixture
 def fleet(tmp_path):
     return make_fleet(tmp_path / "fleet", UNITS)
