@@ -31,7 +31,8 @@ SETTINGS = {
     # A worker holds the unit that it works on and no other, so that only this one is blamed where the worker dies.
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.worker.daemon": True,
-    # A unit's seconds of algebra are no hanging event loop; looking for one, and sampling where a worker is, takes a tenth of a core.
+    # A unit's seconds of algebra are no hanging event loop; watching for one, and sampling what a worker does, take a tenth of a
+    # core.
     "distributed.admin.tick.limit": "1h",
     "distributed.admin.tick.interval": "1s",
     "distributed.worker.profile.enabled": False,
