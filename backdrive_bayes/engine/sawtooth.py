@@ -110,15 +110,16 @@ def _bell(start, step, out):
 
 @numba.njit(cache=True, fastmath=True)
 def _toothed(value, fresh, memory, sd, height, length, holds):
-    first = np.ones(holds.size)
+    first, runs = np.ones(holds.size), 1.0
     for k in range(1, holds.size):
         first[k] = first[k - 1] * holds[k - 1]
-    first /= first.sum()
-    now, then, on, back = first.copy(), np.zeros(holds.size), np.empty(holds.size), np.empty(holds.size)
+        runs += first[k]
+    now, then, on, back = first / runs, np.zeros(holds.size), np.empty(holds.size), np.empty(holds.size)
     found, known, stray, fall = 0.0, (1.0 - STRAY) / sd, STRAY / FAR, height / length
     for t in range(1, value.size):
         if fresh[t]:
-            now[:] = first
+            for k in range(holds.size):
+                now[k] = first[k] / runs
             continue
         # The tooth's value is height / 2 - fall k; it goes on to k + 1, or leaps to k = 0.
         top = (value[t] - memory * value[t - 1] - 0.5 * height * (1.0 - memory)) / sd

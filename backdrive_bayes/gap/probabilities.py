@@ -27,15 +27,15 @@ class Calibration:
     90 % set must gather.
     """
 
-    cool: float = 2.63
-    warm: float = 1.1
-    single: float = -2.8
-    second: float = -2.82
-    wave: float = -2.03
-    unlisted: float = -1.64
-    beside: float = -2.97
-    spread: float = 0.32
-    cover: float = 0.92
+    cool: float = 1.1
+    warm: float = 1.18
+    single: float = -2.81
+    second: float = -3.63
+    wave: float = -1.09
+    unlisted: float = -1.75
+    beside: float = -2.92
+    spread: float = 0.29
+    cover: float = 0.91
 
 
 CALIBRATION = Calibration()

@@ -144,7 +144,10 @@ def _balance(chain, load, angle, state):
     coupling, step = np.empty_like(angle), np.empty_like(angle)
     _gradient(chain, load, angle, state, gradient, diagonal, coupling)
     for _ in range(60):
-        if np.abs(gradient).max() < RESIDUAL:
+        largest = 0.0
+        for j in range(angle.size):
+            largest = max(largest, abs(gradient[j]))
+        if largest < RESIDUAL:
             return
         _newton_step(gradient, diagonal, coupling, step)
         _descend(chain, load, angle, step, state, gradient, diagonal, coupling)
@@ -169,7 +172,8 @@ def _commit(chain, load, angle, state):
         stuck[0] += chain.stick[3] * (angle[body] - old[body])
         if abs(stuck[0]) > chain.stick[1]:
             stuck[0], broke = np.sign(stuck[0]) * chain.stick[2], True
-    old[:] = angle
+    for j in range(stages):
+        old[j] = angle[j]
     return broke
 
 

@@ -40,11 +40,14 @@ def _blank(chain):
 
 @numba.njit(cache=True)
 def _keep(state, trial):
-    state[0][:] = trial[0]
-    state[1][:] = trial[1]
-    state[2][:] = trial[2]
-    state[3][:] = trial[3]
-    state[4][:] = trial[4]
+    """Copy one state into the other; by elements, for numba compiles a check of shapes for as long as all else here."""
+    for i in range(state[0].size):
+        state[0][i], state[2][i] = trial[0][i], trial[2][i]
+        for m in range(state[1].shape[1]):
+            state[1][i, m] = trial[1][i, m]
+    for i in range(state[3].size):
+        state[3][i] = trial[3][i]
+    state[4][0] = trial[4][0]
 
 
 @numba.njit(cache=True)
