@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 LEVEL = 0.95
 
@@ -13,8 +13,8 @@ LEVEL = 0.95
 def clopper_pearson(count: float, of: float, level: float = LEVEL) -> tuple[float, float]:
     """Exact binomial interval of a share (Clopper & Pearson 1934, doi:10.1093/biomet/26.4.404); (0, 1) for none of none."""
     tail = 0.5 * (1.0 - level)
-    low = beta.ppf(tail, count, of - count + 1.0) if count > 0 else 0.0
-    high = beta.ppf(1.0 - tail, count + 1.0, of - count) if count < of else 1.0
+    low = betaincinv(count, of - count + 1.0, tail) if count > 0 else 0.0
+    high = betaincinv(count + 1.0, of - count, 1.0 - tail) if count < of else 1.0
     return float(low), float(high)
 
 
