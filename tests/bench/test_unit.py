@@ -21,7 +21,7 @@ from backdrive_bayes.bench.writing import truth_json, write_unit
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.unit_folder import read_unit
 
-QUICK = make_plan((0.5, 2.5, 5.0), sampling_hz=500.0)
+QUICK = make_plan((0.5, 5.0), sampling_hz=500.0)
 BENCH = Path(__file__).resolve().parents[2] / "backdrive_bayes" / "bench"
 ALLOWED = {*sys.stdlib_module_names, "numpy", "scipy", "numba", "mujoco"}
 OWN = ("backdrive_bayes.bench", "backdrive_bayes.records.record", "backdrive_bayes.errors")
