@@ -25,8 +25,8 @@ from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.reducer import BASELINE, TOP, ReducerClass, place_knots, spaced
 from backdrive_bayes.mechanics.registry import all_effects
 
-KNOTS = 80
-MOST_KNOTS = 140
+KNOTS, MOST_KNOTS = 60, 140
+"""Knots of clearance and free play at first, and refined."""
 LEAST_APART = 0.3
 """Least distance of knots in the torque noise of a sample."""
 CONSPICUOUS = 3.5
