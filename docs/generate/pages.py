@@ -17,8 +17,9 @@ import numpy as np
 
 import backdrive_bayes.schemas
 from backdrive_bayes.commands.main import VERBS, main
-from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, reduced, sample, traces
-from backdrive_bayes.gap import examine, probabilities, properties, shrink, simulator
+from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, prediction, reduced, sample, traces
+from backdrive_bayes.gap import examine, probabilities, properties, shrink
+from backdrive_bayes.indicators import same_loop
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import reducer
 from backdrive_bayes.mechanics.registry import LIBRARY
@@ -42,8 +43,8 @@ NUMBERS = {
     "widths": ", ".join(f"{w:g}" for w in properties.WIDTHS),
     "onsets": ", ".join(f"{q:g}" for q in properties.ONSETS),
     "before": f"{properties.BEFORE:g}",
-    "same_torque": f"{100 * simulator.SAME_TORQUE:g} %",
-    "same_rate": f"{100 * simulator.SAME_RATE:g} %",
+    "same_torque": f"{100 * prediction.SLACK:g} %",
+    "same_rate": f"{100 * same_loop.SAME_RATE:g} %",
     "smallest_gap": f"{100 * shrink.SMALLEST_GAP:g} %",
     "sure": f"{properties.SURE:g}",
     "usual_line": f"{lines.USUAL:g}",
