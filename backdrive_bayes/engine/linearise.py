@@ -76,10 +76,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
             beside = _Search(reduced, effects, modules, (*fixed, wave)).run(start, TRIAL_STEPS)
             trials.append((beside.log_marginal - PRICE, start, (wave,)))
     _, start, waves = max(trials, key=lambda found: found[0])
-    search = _Search(reduced, effects, modules, (*fixed, *waves))
-    # A few trial steps do not tell where a start leads to: the best one and none are both followed to their end.
-    ends = (search.run(begun, STEPS, refine=True) for begun in _apart([start, Distortion()], reduced.context))
-    joint = max(ends, key=lambda end: end.log_marginal)
+    joint = _Search(reduced, effects, modules, (*fixed, *waves)).run(start, STEPS, refine=True)
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, 0.0))
     found, bent = [joint], _bent(joint, reach)
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
