@@ -36,7 +36,7 @@ def test_results_show_themselves_and_escape_what_others_wrote(tmp_path):
 
 
 def test_a_diagnosis_shows_its_answer_and_is_evidence_of_its_model(tmp_path):
-    unit = replace(planted(known=smooth_reducer(), offset_nm=8e-4, loops=((0.1, 0.1),)), name="<offset>")
+    unit = replace(planted(known=smooth_reducer(), offset_nm=8e-4), name="<offset>")
     found = backdrive_bayes.diagnose(unit)
     assert found.effects == ["torque_offset"] and found.probabilities["torque_offset"] > 0.5
     assert sum(found.probabilities.values()) == pytest.approx(1)

@@ -13,8 +13,8 @@ from backdrive_bayes.results import DIAGNOSIS
 
 @pytest.fixture(scope="module")
 def twice():
-    """A unit of one record with a torque offset, diagnosed twice with few draws."""
-    unit = planted(known=smooth_reducer(), offset_nm=8e-4, loops=((0.1, 0.1),))
+    """A unit with a torque offset, diagnosed twice with few draws."""
+    unit = planted(known=smooth_reducer(), offset_nm=8e-4)
     with pytest.MonkeyPatch.context() as patch:
         for name, value in (("FIRST_STEPS", 3), ("MOST_STEPS", 3)):
             patch.setattr(sample, name, value)
