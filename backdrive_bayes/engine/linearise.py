@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backdrive_bayes.engine.design import (
+    LEAST_LAW,
     Group,
     class_groups,
     class_priors,
@@ -15,6 +16,7 @@ from backdrive_bayes.engine.design import (
     path_group,
     tangent_groups,
 )
+from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.periodic import PRICE, WAVE, clearest_wave, periodic_group
@@ -38,10 +40,11 @@ STEPS = 14
 TRIAL_STEPS = 2
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque; exponents fifty times as much."""
+LAW = "rate_dependent_friction"
 BENDING = {
     "torque_offset": ("offset",),
     "sensor_lag": ("lag_s",),
-    "rate_dependent_friction": ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend"),
+    LAW: ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend"),
 }
 """Effects whose columns are derivatives, and the places of their parameters in a distortion."""
 BENT = 2.0
@@ -49,20 +52,15 @@ BENT = 2.0
 MOST_BENT = 2
 WIDE = 2.0
 """Standard deviation of an effect's log scale while the mode is searched."""
-USUAL_JITTER = Jitter(0.15, 0.002)
-"""Of the bench's torque noise, and of the torque scale."""
-JITTER_LOG_SD = 1.5
-"""Standard deviation of the log jitter about its usual size."""
-JITTERS = tuple(Jitter(size, length) for size in (0.15, 0.5, 1.5, 5.0, 15.0, 45.0) for length in (0.002, 0.01, 0.05))
-"""Sizes and lengths that are tried."""
+
 
 
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
     """The joint model's mode, where every effect may act, and modes of what bends the prediction.
 
-    Whatever cannot be followed by a straight line from the joint mode (an offset, a lag, a law of the rate, a wave) has modes
-    of its own: one where none of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode
-    where it is likeliest.
+    The joint mode is the higher of the ends of two searches, from the best start and from an undistorted bench. Whatever cannot
+    be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own: one where none
+    of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode where it is likeliest.
     """
     fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))
     starts = _apart([*possible_starts(reduced), Distortion()], reduced.context)
@@ -76,60 +74,47 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
             beside = _Search(reduced, effects, modules, (*fixed, wave)).run(start, TRIAL_STEPS)
             trials.append((beside.log_marginal - PRICE, start, (wave,)))
     _, start, waves = max(trials, key=lambda found: found[0])
-    joint = _Search(reduced, effects, modules, (*fixed, *waves)).run(start, STEPS, refine=True)
+    joint, waves = max(
+        (
+            (_Search(reduced, effects, modules, (*fixed, *beside)).run(begin, STEPS, refine=True), beside)
+            for begin, beside in {(start, waves): None, (Distortion(), ()): None}
+        ),
+        key=lambda ended: ended[0].log_marginal - PRICE * len(ended[1]),
+    )
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, 0.0))
-    found, bent = [joint], _bent(joint, reach)
+    bent = _bent(joint, reach)
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
-    for count in range(min(len(bent), MOST_BENT) + 1 if bent else 0):
-        for some in itertools.combinations(bent, count):
-            search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
-            found.append(search.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter))
-    return tuple(linear.without(WAVE) for linear in found)
+
+    def mode(some: tuple[str, ...]) -> Linear:
+        search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
+        return search.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter)
+
+    apart: dict[tuple[str, ...], Linear] = {}
+    if LAW not in bent and np.ptp(reduced.context.log_rate) > LEAST_LAW:
+        # A creep may stand for all of it.
+        apart[(LAW,)] = mode((LAW,))
+        bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, reduced.context) else bent
+    counts = range(min(len(bent), MOST_BENT) + 1 if bent else 0)
+    found = (apart.get(some) or mode(some) for count in counts for some in itertools.combinations(bent, count))
+    return tuple(linear.without(WAVE) for linear in (joint, *found))
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
     """What is too large at the joint mode, or where the legs agree best, to be taken back along a straight line."""
-    context, large = joint.reduced.context, []
-    for name, places in BENDING.items():
-        if _length(reach, replace(reach, **dict.fromkeys(places, 0.0)), context) > BENT * context.torque_noise:
-            large.append(name)
-    return (*large, WAVE) if WAVE in joint.design.names else tuple(large)
+    large = tuple(name for name in BENDING if _bends(name, reach, joint.reduced.context))
+    return (*large, WAVE) if WAVE in joint.design.names else large
+
+
+def _bends(name: str, distortion: Distortion, context) -> bool:
+    """Whether an effect moves the prediction further than along a straight line."""
+    straight = replace(distortion, **dict.fromkeys(BENDING[name], 0.0))
+    return _length(distortion, straight, context) > BENT * context.torque_noise
 
 
 def _only(distortion: Distortion, some) -> Distortion:
     """A distortion by some effects alone."""
     return replace(distortion, **{p: 0.0 for n, places in BENDING.items() if n not in some for p in places})
-
-
-def learn_jitter(linear: Linear) -> Jitter:
-    """The jitter with the highest marginal likelihood times its prior, other things as they are: uphill from the present one."""
-    reduced, scale = linear.reduced, np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index]
-    noise, slopes, columns = reduced.context.torque_noise, reduced.slopes(linear.predicted), linear.design.records()
-
-    def height(jitter):
-        size = Jitter(jitter.torque * noise, jitter.length)
-        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof, reduced.trust)
-        prior = -0.5 * (np.log(jitter.torque / USUAL_JITTER.torque) / JITTER_LOG_SD) ** 2
-        return data.log_marginal(scale) + data.log_volume + prior
-
-    present = np.log([linear.jitter.torque / noise, linear.jitter.length])
-    best = min(JITTERS, key=lambda j: float(np.abs(np.log([j.torque, j.length]) - present).sum()))
-    known = {best: height(best)}
-    while True:
-        for other in _neighbours(best):
-            known.setdefault(other, height(other) if other not in known else 0.0)
-        better = max(known, key=lambda size: known[size])
-        if better == best:
-            return Jitter(best.torque * noise, best.length)
-        best = better
-
-
-def _neighbours(jitter):
-    sizes, lengths = sorted({j.torque for j in JITTERS}), sorted({j.length for j in JITTERS})
-    i, j = sizes.index(jitter.torque), lengths.index(jitter.length)
-    near = [(i + a, j + b) for a in (1, 0, -1) for b in (0, 1, -1) if a or b]
-    return [Jitter(sizes[a], lengths[b]) for a, b in near if 0 <= a < len(sizes) and 0 <= b < len(lengths)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,11 @@ GROWTH_STEP = 2e-3
 """Step of the difference quotients by the growth of thresholds."""
 ZONES = 12
 """Groups of clearance relays whose first state is free in each record."""
+LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
+"""Torques about which thresholds of friction, and drags of clearance and free play, cease to be usual."""
+SHARED, ALIKE = 0.97, 0.15
+"""Share of the variance of clearance and free play that neighbours have in common, and the correlation's length in shares of all
+knots. These and the largest drag: of what was tried, what made the marginal likelihood of clean units highest on four benches."""
 HALVINGS = 4
 """How often the interval of knots next to zero is halved: the width at zero torque is that of a point, block means are not."""
 BASELINE = ("geometric", "elastic", "friction")
@@ -129,7 +134,7 @@ class ReducerClass:
     def initial_columns(self, history: History, clearance_weights=None, growth=(0.0, 0.0)):
         """What a record's unknown initial state adds: columns of friction left up or down, and of clearance zones left up.
 
-        ``clearance_weights`` (cells,) are the present weights of the clearance, that a zone's state moves.
+        ``clearance_weights`` (cells,) are the present independent weights of the clearance, that a zone's state moves.
         """
         found = {}
         if self.has("friction"):
@@ -140,9 +145,8 @@ class ReducerClass:
             part = self.part("clearance")
             cells = self._cells(part, growth)
             moved = cells.means(history, "upper") - cells.means(history)
-            weights = (
-                np.abs(clearance_weights) if clearance_weights is not None else np.full(cells.count, np.exp(part.log_scale[0]))
-            )
+            usual = np.full(cells.count, np.exp(part.log_scale[0]))
+            weights = usual if clearance_weights is None else np.abs(part.weights(clearance_weights))
             zone = _zones(weights)
             found["floating"] = np.stack([moved[:, zone == k] @ weights[zone == k] for k in range(ZONES)], axis=1)
         return found
@@ -183,7 +187,7 @@ def _friction() -> Part:
                 high = TOP - r if high + r >= 1 else high
                 rows.append((low + r, low - r, high - low, r, 0.5 * (low + high)))
     up, down, width, threshold, centre = np.array(rows).T
-    level = 1.0 / (1.0 + (threshold / 0.3) ** 4)
+    level = _below(threshold, LARGEST_THRESHOLD)
     near = np.exp(-_apart(np.log(threshold)) / 0.7) * (0.5 + 0.5 * np.exp(-_apart(np.sqrt(centre)) / 0.3))
     mixing = np.linalg.cholesky(np.outer(level, level) * near + 1e-9 * np.eye(up.size))
     return Part("friction", "friction", Cells(up, down, width, np.full(up.size, 2.0)), mixing, (float(np.log(0.1)), 1.5))
@@ -191,12 +195,27 @@ def _friction() -> Part:
 
 def _clearance(knots) -> Part:
     width = np.diff(knots)
-    return Part("clearance", "geometric", Cells(knots[:-1], -knots[1:], width, 2 * width), None, (float(np.log(0.02)), 1.5))
+    cells = Cells(knots[:-1], -knots[1:], width, 2 * width)
+    return Part("clearance", "geometric", cells, _neighbouring(knots), (float(np.log(0.02)), 1.5))
 
 
 def _free_play(knots) -> Part:
     width = np.diff(knots)
-    return Part("free_play", "geometric", Cells(knots[:-1], knots[:-1], width, width), None, (float(np.log(0.003)), 1.0))
+    cells = Cells(knots[:-1], knots[:-1], width, width)
+    return Part("free_play", "geometric", cells, _neighbouring(knots), (float(np.log(0.003)), 1.0))
+
+
+def _neighbouring(knots) -> np.ndarray:
+    """Root of the prior covariance of steps between knots, (cells, cells): teeth that are crossed at about the same torque make
+    them alike, and small against the load; one tooth by itself may be crossed anywhere."""
+    level = _below(0.5 * (knots[1:] + knots[:-1]), LARGEST_DRAG)
+    near = np.exp(-_apart(np.linspace(0.0, 1.0, level.size)) / ALIKE)
+    return np.linalg.cholesky(SHARED * np.outer(level, level) * near + (1.0 - SHARED) * np.eye(level.size))
+
+
+def _below(torque, most: float):
+    """Falls from one to nothing where a torque exceeds ``most``: friction and drag are small against the load."""
+    return 1.0 / (1.0 + (torque / most) ** 4)
 
 
 def _apart(values):

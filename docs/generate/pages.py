@@ -28,6 +28,9 @@ from backdrive_bayes.records import lines
 NUMBERS = {
     "unsettled": f"{reduced.UNSETTLED:g}",
     "bent": f"{linearise.BENT:g}",
+    "shared": f"{reducer.SHARED:g}",
+    "alike": f"{reducer.ALIKE:g}",
+    "largest_drag": f"{reducer.LARGEST_DRAG:g}",
     "power": f"{infer.POWER:g}",
     "max_rhat": f"{diagnostics.MAX_RHAT:g}",
     "min_ess": f"{diagnostics.MIN_ESS:g}",

@@ -35,6 +35,22 @@ def test_the_prior_of_every_part_has_its_covariance_from_mixing():
             assert np.array_equal(part.mixing, np.tril(part.mixing))
 
 
+def alike(knots, edges=(0.06, 0.1, 0.16)):
+    """Prior correlation of what clearance crosses between the first two of the torques and between the last two."""
+    part = ReducerClass(knots).part("clearance")
+    first, middle, last = np.searchsorted(knots, edges)
+    one, other = part.mixing[first:middle].sum(axis=0), part.mixing[middle:last].sum(axis=0)
+    return one @ other / (np.linalg.norm(one) * np.linalg.norm(other))
+
+
+def test_steps_nearby_are_alike_however_dense_the_knots():
+    """The prior is one of the loop, not of its knots: twice as many leave neighbouring stretches as alike as they were."""
+    coarse = np.r_[0.0, np.geomspace(0.01, TOP, 40)]
+    fine = np.sort(np.r_[coarse, 0.5 * (coarse[1:] + coarse[:-1])])
+    assert alike(coarse) == pytest.approx(alike(fine), abs=0.05)
+    assert alike(coarse) > 0.4 > alike(coarse, (0.01, 0.02, 1.0)) and alike(coarse) < 0.98
+
+
 def test_every_part_answers_up_to_full_load():
     """Read-outs that end below the largest torque made clean loops seem to slip."""
     history = through(np.arange(4.0), np.array([0.0, -TOP, 0.999, 1.0]), 1.0)
@@ -100,8 +116,8 @@ def test_initial_columns_are_those_of_thresholds_and_zones():
 
 def test_zones_together_are_all_relays_left_up():
     history, weights = ramp(0.0, 1.0, -1.0), np.linspace(0.5, 2.0, KNOTS.size - 1)
-    cells = REDUCER.part("clearance").cells
-    moved = (cells.means(history, "upper") - cells.means(history)) @ weights
+    part = REDUCER.part("clearance")
+    moved = (part.cells.means(history, "upper") - part.cells.means(history)) @ np.abs(part.weights(weights))
     np.testing.assert_allclose(REDUCER.initial_columns(history, weights)["floating"].sum(axis=1), moved, atol=1e-12)
 
 
