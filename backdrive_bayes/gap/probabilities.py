@@ -27,14 +27,14 @@ class Calibration:
     90 % set must gather.
     """
 
-    cool: float = 1.1
-    warm: float = 1.18
-    single: float = -2.81
-    second: float = -3.63
-    wave: float = -1.09
-    unlisted: float = -1.75
-    beside: float = -2.92
-    spread: float = 0.29
+    cool: float = 1.64
+    warm: float = 1.04
+    single: float = -2.87
+    second: float = -3.64
+    wave: float = -1.59
+    unlisted: float = -1.81
+    beside: float = -2.83
+    spread: float = 0.28
     cover: float = 0.91
 
 
@@ -61,7 +61,7 @@ def probabilities(
     hottest = calibration.cool + calibration.warm * np.sqrt(max(0.0, *log_factor.values()))
     misfit = _misfits(log_factor, left, calibration)
     found = [_weights(log_factor, misfit, max(hottest * t, 1.0), calibration) for t in TEMPERATURES]
-    joint = {h: float(np.mean([f[h] for f in found])) for h in found[0]}
+    joint = {h: float(sum(f[h] for f in found)) / len(found) for h in found[0]}
     for name, p in properties.items():
         joint = _beside(joint, name, p, calibration)
     total = sum(joint.values())
