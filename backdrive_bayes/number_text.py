@@ -80,6 +80,18 @@ def probability_text(probability: float | None) -> str:
     return f"{probability:.3f}" if probability > 0.9 or probability < 0.1 else f"{probability:.2f}"
 
 
+def share_text(interval: dict | None) -> str:
+    """A closed fraction with its interval as per cent; ends at −100 % are bounds, because fractions are clipped there."""
+    if not interval:
+        return "not defined"
+    median, lo, hi = (_per_cent(interval[k]) for k in ("median", "lo", "hi"))
+    return f"{median} %" if interval["lo"] == interval["hi"] else f"{median} % [{lo}, {hi}]"
+
+
+def _per_cent(share):
+    return "≤ −100" if share <= -0.995 else f"{round(100 * share)}".replace("-", "−")
+
+
 def level_text(level: float) -> str:
     """The level of intervals as per cent."""
     return f"{100 * level:.3g} %"

@@ -21,7 +21,7 @@ from backdrive_bayes.commands.results import (
 from backdrive_bayes.commands.stages import DIAGNOSE, DIAGNOSE_SIMULATED
 from backdrive_bayes.commands.tables import show_indicators, show_simulator, show_which
 from backdrive_bayes.decisions.outcome import line
-from backdrive_bayes.number_text import probability_text
+from backdrive_bayes.number_text import probability_text, share_text
 
 HELP = "find the unmodelled effect behind the gap between model and measurement"
 
@@ -77,7 +77,7 @@ def _summarise(result: dict, sampled, out: Path) -> None:
     elif not result["inconclusive"]:
         closed = result["shrink"]["closed_fraction"]
         if closed is not None:
-            say(f"closed on data left out: {closed['median']:.0%} [{closed['lo']:.0%}, {closed['hi']:.0%}] (90 %)")
+            say(f"closed on data left out: {share_text(closed)} (90 %)")
     if sampled is not None:
         show_indicators(sampled[1])
     say(f"written to {out}")

@@ -61,18 +61,6 @@ def chance(probability: float) -> str:
     return ">99 %" if probability < 1 and percent > 99 else f"{percent:.0f} %"
 
 
-def share_text(interval: dict | None) -> str:
-    """A closed fraction with its interval as per cent; ends at −100 % are bounds, because fractions are clipped there."""
-    if not interval:
-        return "not defined"
-    median, lo, hi = (_per_cent(interval[k]) for k in ("median", "lo", "hi"))
-    return f"{median} %" if interval["lo"] == interval["hi"] else f"{median} % [{lo}, {hi}]"
-
-
-def _per_cent(share):
-    return "≤ −100" if share <= -0.995 else f"{round(100 * share)}".replace("-", "−")
-
-
 def signed(value: float | None) -> str:
     """A shift with its sign and one decimal; beyond ``FAR`` only that it lies there."""
     if value is None:

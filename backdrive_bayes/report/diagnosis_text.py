@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, more_words, share_text
+from backdrive_bayes.figures.diagnosis_words import answer_words, label_words, more_words
 from backdrive_bayes.figures.style import in_words
-from backdrive_bayes.number_text import significant
+from backdrive_bayes.number_text import share_text, significant
 from backdrive_bayes.report.blocks import Facts, Paragraph
 from backdrive_bayes.report.sentences import proposal
 from backdrive_bayes.report.text import Free, free

@@ -13,8 +13,9 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.figures import catalogue
 from backdrive_bayes.figures.diagnosis import figures_of
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import answer_words, chance, drawable, share_text
+from backdrive_bayes.figures.diagnosis_words import answer_words, chance, drawable
 from backdrive_bayes.figures.style import styled
+from backdrive_bayes.number_text import share_text
 
 NAMES = ["diagnosis", "gap-map", "gap-residual", "closed-fraction", "parameter-shift"]
 NO_GAP = {
