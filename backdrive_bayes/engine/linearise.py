@@ -54,7 +54,6 @@ WIDE = 2.0
 """Standard deviation of an effect's log scale while the mode is searched."""
 
 
-
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
     """The joint model's mode, where every effect may act, and modes of what bends the prediction.
 
@@ -77,7 +76,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     joint, waves = max(
         (
             (_Search(reduced, effects, modules, (*fixed, *beside)).run(begin, STEPS, refine=True), beside)
-            for begin, beside in {(start, waves): None, (Distortion(), ()): None}
+            for begin, beside in dict.fromkeys([(start, waves), (Distortion(), ())])
         ),
         key=lambda ended: ended[0].log_marginal - PRICE * len(ended[1]),
     )
