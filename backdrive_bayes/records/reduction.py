@@ -15,6 +15,9 @@ from scipy.optimize import isotonic_regression
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.record import Record
 
+HALVINGS = 3
+"""How often the blocks next to a turning point are halved: the peak is the angle of a point, block means are not."""
+
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -106,6 +109,8 @@ def _block_edges(angle, wanted, noise):
     along = move / move.sum() if move.sum() > 0 else width / n
     density = np.r_[0.0, np.cumsum(0.5 * width / n + 0.5 * along)]
     cuts = np.interp(np.linspace(0, 1, wanted + 1), density / density[-1], bins)
+    near = 0.5 ** np.arange(1, HALVINGS + 1)
+    cuts = np.r_[cuts, cuts[0] + near * (cuts[1] - cuts[0]), cuts[-1] - near * (cuts[-1] - cuts[-2])]
     return np.unique(np.round(cuts).astype(int))
 
 
