@@ -57,30 +57,28 @@ WIDE = 2.0
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
     """The joint model's mode, where every effect may act, and modes of what bends the prediction.
 
-    The joint mode is the higher of the ends of two searches, from the best start and from an undistorted bench. Whatever cannot
-    be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own: one where none
-    of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode where it is likeliest.
+    The joint mode is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside
+    the clearest wave of what is left there, if that is higher still. Whatever cannot be followed by a straight line from there
+    (an offset, a lag, a law of the rate, a wave) has modes of its own: one where none of them acts, and those of each and of
+    each pair alone. A hypothesis is weighed about the mode where it is likeliest.
     """
     fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))
-    starts = _apart([*possible_starts(reduced), Distortion()], reduced.context)
-    trials: list[tuple[float, Distortion, tuple[Group, ...]]] = []
-    for start in starts:
-        trial = _Search(reduced, effects, modules, fixed).run(start, TRIAL_STEPS)
-        trials.append((trial.log_marginal, start, ()))
-        gain, frequency = clearest_wave(trial)
-        if gain > 0:
-            wave = periodic_group(trial, frequency)
-            beside = _Search(reduced, effects, modules, (*fixed, wave)).run(start, TRIAL_STEPS)
-            trials.append((beside.log_marginal - PRICE, start, (wave,)))
-    _, start, waves = max(trials, key=lambda found: found[0])
-    joint, waves = max(
-        (
-            (_Search(reduced, effects, modules, (*fixed, *beside)).run(begin, STEPS, refine=True), beside)
-            for begin, beside in dict.fromkeys([(start, waves), (Distortion(), ())])
-        ),
-        key=lambda ended: ended[0].log_marginal - PRICE * len(ended[1]),
-    )
-    reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, 0.0))
+    starts = possible_starts(reduced)
+    free = _Search(reduced, effects, modules, fixed)
+    joint = free.run(Distortion(), STEPS, refine=True)
+    others = _apart([Distortion(), *starts], reduced.context)[1:]
+    if others:
+        begin = max(others, key=lambda start: free.run(start, TRIAL_STEPS).log_marginal) if len(others) > 1 else others[0]
+        joint = max(joint, free.run(begin, STEPS, refine=True), key=lambda ended: ended.log_marginal)
+    waves: tuple[Group, ...] = ()
+    gain, frequency = clearest_wave(joint)
+    if gain > 0:
+        wave = periodic_group(joint, frequency)
+        waved = _Search(reduced, effects, modules, (*fixed, wave)).run(joint.distortion, STEPS, refine=True)
+        if waved.log_marginal - PRICE > joint.log_marginal:
+            joint, waves = waved, (wave,)
+    late = max(start.lag_s for start in starts)
+    reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
     bent = _bent(joint, reach)
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)

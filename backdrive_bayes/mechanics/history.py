@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from backdrive_bayes.records.reduction import Blocks
+from backdrive_bayes.records.reduction import FEW, Blocks
 
 PIECES = 3
 """Straight pieces a block: the torque within a block is nearly straight, turning points are nodes of their own."""
-FEW = 6
-"""Samples up to which a block's mean is that of its samples: the steps between them are then no part of what was read."""
 
 
 @dataclass(frozen=True, eq=False)

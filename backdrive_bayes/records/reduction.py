@@ -15,8 +15,11 @@ from scipy.optimize import isotonic_regression
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.record import Record
 
+FEW = 6
+"""Samples up to which a block's mean is that of its samples: the steps between them are then no part of what was read."""
 HALVINGS = 3
-"""How often the blocks next to a turning point are halved: the peak is the angle of a point, block means are not."""
+"""How often the blocks next to a turning point are halved, down to FEW samples: the peak is the angle of a point, block means are
+not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +113,8 @@ def _block_edges(angle, wanted, noise):
     density = np.r_[0.0, np.cumsum(0.5 * width / n + 0.5 * along)]
     cuts = np.interp(np.linspace(0, 1, wanted + 1), density / density[-1], bins)
     near = 0.5 ** np.arange(1, HALVINGS + 1)
-    cuts = np.r_[cuts, cuts[0] + near * (cuts[1] - cuts[0]), cuts[-1] - near * (cuts[-1] - cuts[-2])]
+    first, last = (near[near * size >= FEW] * size for size in (cuts[1] - cuts[0], cuts[-1] - cuts[-2]))
+    cuts = np.r_[cuts, cuts[0] + first, cuts[-1] - last]
     return np.unique(np.round(cuts).astype(int))
 
 

@@ -179,7 +179,8 @@ def test_friction_that_follows_the_rate_is_found_at_its_own_mode():
 def test_a_law_of_the_rate_that_a_creep_may_stand_for_has_its_own_mode():
     """Of two rates, the joint mode takes a creep for all of it."""
     found = linearise(reduce_unit(planted(known=_rough_reducer(6.0), exponent=0.4)), library_terms())
-    assert found[0].distortion.friction_exponent < 0.1 and found[2].distortion.friction_exponent == pytest.approx(0.4, abs=0.1)
+    joint, *apart = (m.distortion.friction_exponent for m in found)
+    assert joint < 0.1 and max(apart) == pytest.approx(0.4, abs=0.1)
 
 
 def _rough_reducer(times):
