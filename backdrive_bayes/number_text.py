@@ -88,6 +88,11 @@ def share_text(interval: dict | None) -> str:
     return f"{median} %" if interval["lo"] == interval["hi"] else f"{median} % [{lo}, {hi}]"
 
 
+def per_cent_text(share: float) -> str:
+    """One share as per cent; −100 % is a bound."""
+    return f"{_per_cent(share)} %"
+
+
 def _per_cent(share):
     return "≤ −100" if share <= -0.995 else f"{round(100 * share)}".replace("-", "−")
 

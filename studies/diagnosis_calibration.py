@@ -53,6 +53,7 @@ def weigh_unit(folder: Path, truth: dict) -> dict:
         "properties": {p.name: round(p.probability, 4) for p in found.properties},
         "named": "+".join(found.named) or "none",
         "unsupported": found.unsupported,
+        "closed": found.closed and round(found.closed["hi"], 3),
     }
 
 

@@ -7,7 +7,7 @@ import re
 
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.screen import Column, show_table, width
-from backdrive_bayes.number_text import interval_text, level_text, like_interval, marked, probability_text
+from backdrive_bayes.number_text import interval_text, level_text, like_interval, marked, probability_text, share_text
 from backdrive_bayes.results import usable
 
 ARCMIN_PER_RAD = 10800.0 / math.pi
@@ -120,9 +120,8 @@ def show_simulator(found: dict, level: float) -> None:
     """The split of the gap between a simulator and the unit, and the parameters from the one to the other."""
     say(f"simulator {found['unit']}: {found['summary']}")
     if found["told"]:
-        closed = ((words, found[key]) for key, words in SPLIT.items())
-        rows = [[words, *(f"{share[end]:.0%}" for end in ("median", "lo", "hi"))] for words, share in closed]
-        show_table([Column("share of the gap, on data left out", False, 24), *map(Column, ("share", "from", "to"))], rows)
+        rows = [[words, share_text(found[key])] for key, words in SPLIT.items()]
+        show_table([Column("share of the gap, on data left out", False, 24), Column("share")], rows)
     rows = []
     for row in found["parameters"]:
         size = max(abs(row["simulated"]), *(abs(row["measured"][end]) for end in ("lo", "hi")))

@@ -17,6 +17,7 @@ from backdrive_bayes.gap.parameters import interval
 from backdrive_bayes.gap.simulator import Simulator, effects_of, read_simulator, require_reach
 from backdrive_bayes.gap.split import PARTS, STAGES, Split
 from backdrive_bayes.indicators.draws import IndicatorDraws
+from backdrive_bayes.number_text import per_cent_text
 from backdrive_bayes.records.record import Unit
 
 NO_GAP = "No gap that the data can tell: simulator and unit agree within the noise."
@@ -120,7 +121,7 @@ def summary(shares, told: bool, inconclusive: str, effects: tuple[str, ...]) -> 
         return "Inconclusive: nothing is named."
     if not told:
         return NO_GAP
-    first, second, left = (f"{shares[part]['median']:.0%}" for part in PARTS)
+    first, second, left = (per_cent_text(shares[part]["median"]) for part in PARTS)
     if not effects:
         return f"Re-tuning closes {first} of the gap; no effect is missing, {left} is left."
     if effects == ("unknown",):

@@ -142,7 +142,7 @@ def simulator(count=3, **changes):
     found = {
         "unit": "joint.xml",
         "told": True,
-        "summary": "Re-tuning closes 62% of the gap, interface slip a further 30%; 8% is left.",
+        "summary": "Re-tuning closes 62 % of the gap, interface slip a further 30 %; 8 % is left.",
         "closed_by_retuning": shares["retuning"],
         "closed_by_effect": shares["effect"],
         "left": shares["left"],
