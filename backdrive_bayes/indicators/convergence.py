@@ -5,22 +5,32 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from backdrive_bayes.engine.diagnostics import diagnose_draws
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
-from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad, zero_torque_width_rad
+from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad
 from backdrive_bayes.indicators.intervals import ends
+from backdrive_bayes.indicators.loop import Loops
 from backdrive_bayes.records.measured_loop import MeasuredLoop, measured_loops
 from backdrive_bayes.records.record import Unit
 
 STANDARD_ERRORS = 3.0
 SHARE = {"settled": 0.05, "first": 0.3}
 """Share of a measured value by which the interval is widened; a cycle from rest is not the settled loop."""
+
+
+def _width_as_read(loops: Loops, zero_nm: float) -> np.ndarray:
+    """Mean width over torques up to ``zero_nm`` [rad], (draws,): the way it is read from samples."""
+    near = loops.within(zero_nm)
+    return trapezoid(near.width, near.torque_nm, axis=-1) / (2.0 * zero_nm)
+
+
 CHECKED = (
-    ("loop_area_j", "loop area S", "J", loop_area_j),
-    ("half_peak_to_peak_rad", "peak angle", "rad", peak_angle_rad),
-    ("zero_torque_width_rad", "width at zero torque w(0)", "rad", zero_torque_width_rad),
+    ("loop_area_j", "loop area S", "J", lambda loops, loop: loop_area_j(loops)),
+    ("half_peak_to_peak_rad", "peak angle", "rad", lambda loops, loop: peak_angle_rad(loops)),
+    ("zero_torque_width_rad", "width at zero torque w(0)", "rad", lambda loops, loop: _width_as_read(loops, loop.zero_nm)),
 )
 
 
@@ -50,7 +60,7 @@ def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, .
             value = getattr(loop, name)
             if value is None:
                 continue
-            lo, hi = np.quantile(function(loops), ends(level)[::2])
+            lo, hi = np.quantile(function(loops, loop), ends(level)[::2])
             room = STANDARD_ERRORS * getattr(loop, f"{name}_sd") + SHARE[loop.basis] * abs(value)
             if not lo - room <= value <= hi + room:
                 inferred = f"inferred as {lo:.4g} to {hi:.4g} {unit}"

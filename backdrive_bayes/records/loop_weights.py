@@ -110,7 +110,7 @@ def _zero_weights(record: Record, segment) -> np.ndarray | None:
     torque = segment.direction * record.torque_nm[segment.start : segment.stop]
     time = record.time_s[segment.start : segment.stop]
     crossing, count = int(np.count_nonzero(torque < 0.0)), len(torque)
-    reach = max(int(_ZERO_SHARE * count), _LEAST // 2)
+    reach = zero_reach(count)
     windows = [_about(crossing, times * reach, count) for times in (1, 2)]
     # The torque is a straight ramp over more samples than the angle is: its zero is known better than they tell.
     wide = _about(crossing, max(int(RAMP_SHARE * count), 2 * reach), count)
@@ -124,6 +124,11 @@ def _zero_weights(record: Record, segment) -> np.ndarray | None:
         return None
     spans = [slice(segment.start + w.start, segment.start + w.stop) for w in windows]
     return np.stack([_line_weights(record, span, at) for span in spans])
+
+
+def zero_reach(count: int) -> int:
+    """Samples on either side of zero torque that the width is read from, on a ramp of ``count`` samples."""
+    return max(int(_ZERO_SHARE * count), _LEAST // 2)
 
 
 def _about(centre: int, reach: int, count: int) -> slice:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from backdrive_bayes.records.branches import find_segments
-from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle
+from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle, zero_reach
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
 
@@ -23,7 +23,7 @@ class MeasuredLoop:
 
     ``_sd`` are standard errors from the channels' noise. ``basis`` is 'settled' (tip to same tip, the mean of ``cycles`` of
     them, a linear drift of ``drift_rad`` per cycle taken out) or 'first' (0 to +T to -T to 0, the first loading in it). The
-    width is None where the cycle does not reach zero torque on both branches.
+    width is None where the cycle does not reach zero torque on both branches; it is the mean over torques up to ``zero_nm``.
     """
 
     record: str
@@ -37,6 +37,7 @@ class MeasuredLoop:
     half_peak_to_peak_rad_sd: float
     zero_torque_width_rad: float | None
     zero_torque_width_rad_sd: float | None
+    zero_nm: float
 
 
 def measured_loops(unit: Unit) -> tuple[MeasuredLoop | None, ...]:
@@ -69,6 +70,7 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
         half_peak_to_peak_rad_sd=float(np.hypot(_angle_error(record, height, noise), _corner_error(found))),
         zero_torque_width_rad=width,
         zero_torque_width_rad_sd=width_sd,
+        zero_nm=_zero_nm(found),
     )
 
 
@@ -92,6 +94,12 @@ def _width(record: Record, found, weights, noise) -> tuple[float | None, float |
     ramp = 2.0 * RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0]) / 2.0
     torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(found.starts)))
     return float(short), float(np.sqrt(_angle_error(record, weights[0], noise) ** 2 + torque**2 + (long - short) ** 2))
+
+
+def _zero_nm(found) -> float:
+    """Torque on either side of zero from which the width is read [N·m]."""
+    count = int(np.mean([stop - start for start, stop in found.bounds])) // 2
+    return 2.0 * found.amplitude_nm * zero_reach(count) / count
 
 
 def _angle_error(record: Record, weights: np.ndarray, noise: NoiseEstimate) -> float:

@@ -8,8 +8,10 @@ from support.bench import KNOWN_NOISE
 from support.made_posterior import known, made_posterior
 
 from backdrive_bayes.bench.known_truth import KnownReducer, simulate_unit
-from backdrive_bayes.indicators.convergence import convergence_json, examined
+from backdrive_bayes.indicators.convergence import _width_as_read, convergence_json, examined
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
+from backdrive_bayes.indicators.indicators import zero_torque_width_rad
+from backdrive_bayes.records.measured_loop import measured_loops
 
 LOOPS = ((0.05, 0.1), (0.05, 0.04))
 
@@ -44,6 +46,17 @@ def test_width_at_zero_torque_counts_too(unit):
     truth = known()
     wide = KnownReducer(truth.weights | {"clearance": 1.2 * truth.weights["clearance"]})
     assert any("w(0)" in text for text in judged(wide, unit).doubts)
+
+
+def test_a_step_next_to_zero_torque_is_compared_as_it_was_read():
+    """Samples tell the mean width next to zero; at zero itself it is twice as large here (planted fault: compared with that)."""
+    truth = known(drag=0.003)
+    unit = simulate_unit(truth, [(a, r) for r, a in LOOPS], KNOWN_NOISE, np.random.default_rng(3))
+    assert judged(truth, unit).doubts == ()
+    draws = IndicatorDraws(made_posterior(truth, LOOPS, shape=(4, 50)), 0.03)
+    read, loops = measured_loops(unit)[0], draws.loops(*LOOPS[0])
+    assert read.zero_torque_width_rad == pytest.approx(_width_as_read(loops, read.zero_nm).mean(), rel=0.05)
+    assert zero_torque_width_rad(loops).mean() > 1.8 * read.zero_torque_width_rad
 
 
 def test_what_a_late_channel_adds_is_no_contradiction():
