@@ -42,5 +42,5 @@ def learn_jitter(linear: Linear) -> Jitter:
 def _neighbours(jitter):
     sizes, lengths = sorted({j.torque for j in JITTERS}), sorted({j.length for j in JITTERS})
     i, j = sizes.index(jitter.torque), lengths.index(jitter.length)
-    near = [(i + a, j + b) for a in (1, 0, -1) for b in (0, 1, -1) if a or b]
+    near = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
     return [Jitter(sizes[a], lengths[b]) for a, b in near if 0 <= a < len(sizes) and 0 <= b < len(lengths)]

@@ -140,7 +140,7 @@ class _Search:
             known = linear.log_scale
             weights, before, idle = linear.weights, idle, idle | self._backward(linear)
             moved = self._moved(linear)
-            still = idle == before and _length(moved, distortion, context) < 0.025 * LONGEST_STEP
+            still = idle == before and _length(moved, distortion, context) < 0.05 * LONGEST_STEP
             if learnings and (still or step >= 4):
                 found = learn_jitter(linear)
                 learnings, jitter = learnings - 1 if found != jitter else 0, found
