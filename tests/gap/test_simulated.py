@@ -136,7 +136,7 @@ def test_lacking_is_what_the_unit_alone_has():
 
 def test_the_sentence_abstains_with_the_result():
     shares = {part: {"median": 0.5} for part in ("retuning", "effect", "left")}
-    assert "creep a further 50%" in summary(shares, True, "", ("creep",))
+    assert "creep a further 50 %" in summary(shares, True, "", ("creep",))
     assert "no effect is missing" in summary(shares, True, "", ())
     assert "Inconclusive" in summary(shares, True, "not converged", ("creep",))
     assert "agree within the noise" in summary(shares, False, "", ())
