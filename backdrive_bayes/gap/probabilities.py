@@ -27,14 +27,14 @@ class Calibration:
     90 % set must gather.
     """
 
-    cool: float = 1.64
-    warm: float = 1.04
-    single: float = -2.87
-    second: float = -3.64
-    wave: float = -1.59
-    unlisted: float = -1.81
-    beside: float = -2.83
-    spread: float = 0.28
+    cool: float = 1.46
+    warm: float = 1.10
+    single: float = -2.86
+    second: float = -3.60
+    wave: float = -0.98
+    unlisted: float = -1.83
+    beside: float = -2.88
+    spread: float = 0.31
     cover: float = 0.91
 
 
