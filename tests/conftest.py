@@ -56,6 +56,15 @@ def write_csv(path, time, torque, angle, header="time_s,torque_Nm,angle_arcmin")
 
 
 @pytest.fixture
+def few_draws(monkeypatch):
+    """Posteriors of few draws, said not to have converged, for tests of what is said and written."""
+    from backdrive_bayes.engine import sample
+
+    for name in ("FIRST_STEPS", "MOST_STEPS"):
+        monkeypatch.setattr(sample, name, 3)
+
+
+@pytest.fixture
 def unit_folder(tmp_path):
     """A valid unit of one record; tests spoil one thing of it."""
     folder = tmp_path / "unit"

@@ -35,7 +35,7 @@ def test_results_show_themselves_and_escape_what_others_wrote(tmp_path):
     assert len(comparison.claims) == 33 and "&lt;b&gt;" in comparison._repr_html_()
 
 
-def test_a_diagnosis_shows_its_answer_and_is_evidence_of_its_model(tmp_path):
+def test_a_diagnosis_shows_its_answer_and_is_evidence_of_its_model(few_draws, tmp_path):
     unit = replace(planted(known=smooth_reducer(), offset_nm=8e-4), name="<offset>")
     found = backdrive_bayes.diagnose(unit)
     assert found.effects == ["torque_offset"] and found.probabilities["torque_offset"] > 0.5
@@ -149,9 +149,9 @@ def test_example_acceptance_by_batch(run_here, units, tmp_path):
     assert "global risks: {" in said
 
 
-def test_example_mujoco_joint(units, tmp_path):
+def test_example_mujoco_joint(few_draws, run_here, units, tmp_path):
     pytest.importorskip("mujoco", reason="the extra bench is not installed")
-    said = run("mujoco_joint.py", units[0], "--out", tmp_path / "out")
+    said = run_here("mujoco_joint.py", units[0], "--out", tmp_path / "out")
     assert "missing in the model: " in said and (tmp_path / "out" / "report.pdf").exists()
     found = json.loads((tmp_path / "out" / "1-diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
     assert found["simulator"]["unit"] == "mujoco-joint" and found["simulator"]["rms_rad"]["simulated"] > 0.01
