@@ -4,7 +4,8 @@
 
 Every unit's parameters are drawn about the usual ones and its records simulated with a bench's noise, without and with an effect
 that the model does not hold (creep: part of the compliance answers late). Upper limits are then put around the true indicators,
-up to four posterior standard deviations away on either side, as often within as out of limits. Written: acceptance_risk.json.
+up to four posterior standard deviations away on either side, as often within as out of limits. Written: acceptance_risk.json and
+README.md.
 Realised risks are those of the verdict: of the units accepted the share that is out of limits, of the units rejected the share
 within. "near" counts only decisions whose stated risk is more than half the agreed one. The naive decision compares the classic
 least-squares point estimate with the limit.
@@ -138,6 +139,40 @@ def _realised(by_unit, verdict, wrong, least=0.0) -> dict:
     return {"share": share, "stated": stated, "lower_95": lower, "upper_95": upper, "decisions": total}
 
 
+def readme(summary, units) -> str:
+    """The report: realised risks beside the agreed and the stated ones, and the decision by the point estimate."""
+    lines = [
+        f"# Risks of accepting and rejecting\n\nMade by `python studies/acceptance_risk.py --units {units}`.\n",
+        f"Agreed risks: consumer's {CONSUMER:g}, producer's {PRODUCER:g}. Limits stand up to {OFFSETS[-1]:g} posterior standard deviations",
+        "from the truth, as often within as out of it. Realised: the share of the units accepted that are out of limits, of the units",
+        "rejected that are within. Near: decisions whose stated risk is more than half the agreed one. Interval: 90 %, a unit counted as",
+        "one observation. With intervals of half the width the consumer's risk near a limit must be seen to rise: the last line.\n",
+    ]
+    for label, found in summary.items():
+        lines += [f"## {label.capitalize()}\n", f"{found['converged']} of {found['units']} units converged.\n"]
+        lines += ["| risk | agreed | stated | realised | interval | decisions |", "|---|--:|--:|--:|---|--:|"]
+        for name, row in _risk_rows(found):
+            agreed = CONSUMER if "consumer" in name else PRODUCER
+            told = ["–", "–"] if row["share"] is None else [f"{row['stated']:.3f}", f"{row['share']:.3f}"]
+            bounds = f"{row['lower_95']:.3f} – {row['upper_95']:.3f}"
+            lines.append(f"| {name} | {agreed:g} | {told[0]} | {told[1]} | {bounds} | {row['decisions']} |")
+        decided = (f"{found[key]:.2f} {what}" for key, what in _SHARES)
+        lines += [f"\nShares of all decisions: {', '.join(decided)}. The point estimate compared with the limit realises a consumer's"]
+        lines += [f"risk of {found['naive_consumer_risk']:.2f} and a producer's of {found['naive_producer_risk']:.2f}.\n"]
+    return "\n".join(lines)
+
+
+_SHARES = (("accepted_share", "accepted"), ("rejected_share", "rejected"), ("inconclusive_share", "inconclusive"))
+
+
+def _risk_rows(found):
+    """Name and numbers of each risk of one label."""
+    for risk in ("consumer", "producer"):
+        yield f"{risk}'s", found[f"{risk}_risk"]
+        yield f"{risk}'s, near", found[f"{risk}_risk_near"]
+    yield "consumer's, near, intervals halved", found["near_with_halved_intervals"]
+
+
 def main():
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -161,6 +196,7 @@ def main():
             print(label, json.dumps(summary[label], indent=1), flush=True)
             given.out.mkdir(parents=True, exist_ok=True)
             (given.out / "acceptance_risk.json").write_text(json.dumps(summary, indent=1))
+            (given.out / "README.md").write_text(readme(summary, given.units), encoding="utf-8")
 
 
 if __name__ == "__main__":

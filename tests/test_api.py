@@ -130,7 +130,7 @@ def run_here(once, monkeypatch, capsys):
     return run_script
 
 
-def test_example_five_lines(run_here, units, tmp_path):
+def test_example_five_lines(run_here, units, tmp_path, few_draws):
     limits = tmp_path / "limits.toml"
     limits.write_text("[peak_angle_rad]\nmax = 1")
     said = run_here("five_lines.py", units[0], "--limits", limits, "--out", tmp_path / "out")
