@@ -143,11 +143,11 @@ def readme(summary, units) -> str:
     """The report: realised risks beside the agreed and the stated ones, and the decision by the point estimate."""
     lines = [
         f"# Risks of accepting and rejecting\n\nMade by `python studies/acceptance_risk.py --units {units}`.\n",
-        f"Agreed risks: consumer's {CONSUMER:g}, producer's {PRODUCER:g}. Limits stand up to {OFFSETS[-1]:g} standard deviations of the",
-        "posterior from the truth, as often within as out of it. Realised: the share of the units accepted that are out of limits,",
-        "of the units rejected that are within. Near: decisions whose stated risk is more than half the agreed one. Interval:",
-        "90 %, a unit counted as one observation. With intervals of half the width the consumer's risk near a limit must be seen",
-        "to rise: the last line.\n",
+        f"Agreed risks: consumer's {CONSUMER:g}, producer's {PRODUCER:g}.",
+        f"Limits stand up to {OFFSETS[-1]:g} posterior standard deviations from the truth, as often within as out of it.",
+        "Realised: the share of the units accepted that are out of limits, of the units rejected that are within. Near: decisions",
+        "whose stated risk is more than half the agreed one. Interval: 90 %, a unit counted as one observation. With intervals of",
+        "half the width the consumer's risk near a limit must be seen to rise: the last line.\n",
     ]
     for label, found in summary.items():
         lines += [f"## {label.capitalize()}\n", f"{found['converged']} of {found['units']} units converged.\n"]
@@ -158,8 +158,9 @@ def readme(summary, units) -> str:
             bounds = f"{row['lower_95']:.3f} – {row['upper_95']:.3f}"
             lines.append(f"| {name} | {agreed:g} | {told[0]} | {told[1]} | {bounds} | {row['decisions']} |")
         decided = (f"{found[key]:.2f} {what}" for key, what in _SHARES)
-        lines += [f"\nShares of all decisions: {', '.join(decided)}. The point estimate compared with the limit realises"]
-        lines += [f"a consumer's risk of {found['naive_consumer_risk']:.2f} and a producer's of {found['naive_producer_risk']:.2f}.\n"]
+        naive = found["naive_consumer_risk"], found["naive_producer_risk"]
+        lines += [f"\nShares of all decisions: {', '.join(decided)}. The point estimate compared with the limit"]
+        lines += [f"realises a consumer's risk of {naive[0]:.2f} and a producer's of {naive[1]:.2f}.\n"]
     return "\n".join(lines)
 
 
