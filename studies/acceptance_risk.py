@@ -145,8 +145,8 @@ def readme(summary, units) -> str:
         f"# Risks of accepting and rejecting\n\nMade by `python studies/acceptance_risk.py --units {units}`.\n",
         f"Agreed risks: consumer's {CONSUMER:g}, producer's {PRODUCER:g}.",
         f"Limits stand up to {OFFSETS[-1]:g} posterior standard deviations from the truth, as often within as out of it.",
-        "Realised: the share of the units accepted that are out of limits, of the units rejected that are within. Near: decisions",
-        "whose stated risk is more than half the agreed one. Interval: 90 %, a unit counted as one observation. With intervals of",
+        "Realised: the share of the units accepted that are out of limits, of the units rejected that are within. Near:",
+        "decisions whose stated risk is more than half the agreed one. Interval: 90 %, a unit counted once. With intervals of",
         "half the width the consumer's risk near a limit must be seen to rise: the last line.\n",
     ]
     for label, found in summary.items():
