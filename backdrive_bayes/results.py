@@ -117,9 +117,15 @@ def require_own_posterior(path: Path, attributes: dict, about: dict) -> None:
 
 def require_same_data(path: Path, result: dict, about: dict, version: bool = True) -> None:
     """BadInput unless the result at ``path`` is of the unit, the data and (unless it rests on the fit) the version of an
-    indicators object.
+    indicators object, and of its ``k``; a verdict also of its posterior, where it says on which it rests.
     """
     _require_equal(path, result, about, ("unit", "data_sha256", "unit_sha256", *(("version",) if version else ())))
+    for key, found, own in (
+        ("k", result["options"].get("k"), about["options"].get("k")),
+        ("posterior_sha256", result.get("posterior_sha256"), about.get("posterior_sha256")),
+    ):
+        if found and own:
+            _require_equal(path, {key: found}, {key: own}, (key,))
 
 
 _NAMES = {
@@ -128,6 +134,7 @@ _NAMES = {
     "unit_sha256": "a unit file with SHA-256",
     "version": "a result of version",
     "posterior_sha256": "the posterior with SHA-256",
+    "k": "lost motion at the share of T_r",
 }
 
 

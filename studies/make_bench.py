@@ -2,10 +2,12 @@
 
     python studies/make_bench.py OUT --bench contact --units 60 --seed 1 --workers 2
     python studies/make_bench.py OUT --bench ode --units 30 --clean
+    python studies/make_bench.py OUT --bench ode --units 30 --unlisted
 
 Of the units 30 % are clean, 40 % have one listed effect, 15 % an unlisted one (named x_… in the key) and 15 % a pair of listed
 ones, at severities 1, 0.4 and 0.2 dealt evenly. Three in five are run at the default plan, the others at plans drawn at random.
-The same arguments give the same bytes.
+With --clean none has an effect, with --unlisted each has an unlisted one at the least severity. The same arguments give the same
+bytes.
 """
 
 from __future__ import annotations
@@ -42,10 +44,12 @@ INDICATORS = {
 THIRDS = 3
 
 
-def deal(mechanics, units, rng, clean=False) -> list[dict[str, float]]:
+def deal(mechanics, units, rng, clean=False, unlisted=False) -> list[dict[str, float]]:
     """Effects and severities of every unit, in random order; names within a kind of unit come up evenly."""
     if clean:
         return [{} for _ in range(units)]
+    if unlisted:
+        return [dict.fromkeys(own, SEVERITIES[-1]) for own in _hand([(n,) for n in mechanics.unlisted], units, rng)]
     listed = [name for name in mechanics.effects if name not in MEMBERS]
     pairs = [{a, b} for i, a in enumerate(listed) for b in listed[i + 1 :]]
     hands = {NONE: [()], "single": [(n,) for n in listed], "unlisted": [(n,) for n in mechanics.unlisted]}
@@ -154,8 +158,9 @@ def main(argv=None):
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--clean", action="store_true", help="no effect in any unit")
+    parser.add_argument("--unlisted", action="store_true", help="an unlisted effect of severity 0.2 in every unit")
     args = parser.parse_args(argv)
-    dealt = deal(find_bench(args.bench), args.units, np.random.default_rng([args.seed, 7]), args.clean)
+    dealt = deal(find_bench(args.bench), args.units, np.random.default_rng([args.seed, 7]), args.clean, args.unlisted)
     width, key = max(2, len(str(args.units))), {}
     jobs = [(args.out, args.bench, args.seed, i, f"case-{i + 1:0{width}d}", e) for i, e in enumerate(dealt)]
     args.out.mkdir(parents=True, exist_ok=True)

@@ -112,7 +112,7 @@ def _try(folder: Path) -> dict[str, int]:
     empty, command = folder / "empty", folder / "env" / "bin" / "backdrive-bayes"
     empty.mkdir()
     unit = folder / "data" / "reducer-1"
-    calls: dict[str, list] = {"check": [unit, "-o", "out"], "fit": [unit, "-o", "out"], "report": ["out"]}
+    calls: dict[str, list] = {"check": [unit, "-o", "out"], "fit": [unit, "-o", "out"], "report": ["out"], "demo": ["-o", "demo"]}
     return {verb: _run([command, verb, *arguments], empty, check=False).returncode for verb, arguments in calls.items()}
 
 

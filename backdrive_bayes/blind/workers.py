@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from typing import Any
 
 
@@ -39,12 +39,23 @@ def run_all(function: Callable, calls: Mapping[str, tuple], workers: int, done: 
                 finished(name, Outcome(None, "the process died"))
 
 
+def silence_tracker() -> None:
+    """Start Python's resource tracker so that it says nothing of semaphores that it clears after an interrupted run."""
+    option = "ignore:resource_tracker"
+    sys.warnoptions.append(option)
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove(option)
+
+
 def _run_pool(function, calls, workers, finished) -> bool:
     """Run in one pool; False when a process died, and with it what had not finished."""
     workers = min(workers, len(calls))
     if not workers:
         return True
     threads = max(1, (os.cpu_count() or 1) // workers)
+    silence_tracker()
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (threads,))
     alive = True
     try:

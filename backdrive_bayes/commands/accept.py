@@ -72,9 +72,11 @@ def run(args) -> int:
             if made:
                 write_json(folder / "diagnosis.json", evidence.diagnosis)
                 posterior, indicators = made
-                keep_fit(posterior, indicators, folder, not args.no_figures, note)
+                digest = keep_fit(posterior, indicators, folder, not args.no_figures, note)
                 retire(out, indicators)
-            write_json(folder / "verdict.json", verdict)
+            else:
+                digest = evidence.about["posterior_sha256"]
+            write_json(folder / "verdict.json", verdict | {"posterior_sha256": digest})
             keep_run(folder, "accept", began)
             if not args.no_figures:
                 draw_figures("verdict.json", folder)

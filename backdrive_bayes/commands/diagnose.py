@@ -32,7 +32,7 @@ def add_arguments(parser) -> None:
     what = "what a simulator answered to the same or other torque paths: say what it lacks, and what re-tuning it would close"
     parser.add_argument("--simulated", type=Path, metavar="SIM_UNIT", help=what)
     add_fit_arguments(parser)
-    parser.add_argument("--no-posterior", action="store_true", help="write diagnosis.json only, sample nothing")
+    parser.add_argument("--no-posterior", action="store_true", help="write diagnosis.json only")
 
 
 def run(args) -> int:
@@ -77,7 +77,7 @@ def _summarise(result: dict, sampled, out: Path) -> None:
     elif not result["inconclusive"]:
         closed = result["shrink"]["closed_fraction"]
         if closed is not None:
-            say(f"closed on data left out: {share_text(closed)} (90 %)")
+            say(f"closed on held-out data: {share_text(closed)} (90 %)")
     if sampled is not None:
         show_indicators(sampled[1])
     say(f"written to {out}")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 
+from backdrive_bayes.commands.door import repeat_findings
 from backdrive_bayes.commands.output import say, write_folder, write_json
 from backdrive_bayes.commands.results import stamped
 from backdrive_bayes.decisions.outcome import line
@@ -33,12 +35,15 @@ def run(args) -> int:
     import numpy as np
 
     from backdrive_bayes.engine.posterior_read import read_posterior
-    from backdrive_bayes.engine.prediction import nodes, predict_angles, rate_caveat, require_range
+    from backdrive_bayes.engine.prediction import nodes, predict_angles, range_caveat, rate_caveat, require_range
     from backdrive_bayes.records.history import noise_free_torque, read_history
 
     posterior = read_posterior(args.posterior)
     if not posterior.converged:
         raise BadInput(args.posterior, "a converged posterior", "one that is not to be used (its indicators.json says why)")
+    fit = read_group(args.posterior, "sample_stats").attrs
+    data = {"findings": json.loads(fit["findings"]), "forced": bool(fit["forced"])}
+    repeat_findings(posterior.unit_name, data)
     time, measured, guessed = read_history(args.path)
     torque, noisy = noise_free_torque(time, measured)
     for note in (notes := [*guessed, *[NOISY] * noisy]):
@@ -59,20 +64,20 @@ def run(args) -> int:
         elif (out / "prediction.json").is_file():  # those of the prediction that is replaced
             (out / "draws.csv").unlink(missing_ok=True)
         half = float(np.max(bounds[2] - bounds[1]) / 2)
+        caveats = rate_caveat(posterior, time, torque), range_caveat(posterior, torque)
         about = {"reason": f"{time.size} points, half-width at most {half:.3g}′", "notes": notes}
-        result = _sidecar(args, posterior, about | {"caveat": rate_caveat(posterior, time, torque)})
+        result = _sidecar(args, posterior, fit[SEAL], data | about | {"caveat": "; ".join(filter(None, caveats))})
         write_json(folder / "prediction.json", result)
     say(f"{result['unit']}: {line(result['outcome'])}")
     say(f"written to {out}/prediction.csv")
     return result["outcome"]["exit_code"]
 
 
-def _sidecar(args, posterior, about: dict) -> dict:
+def _sidecar(args, posterior, digest: str, about: dict) -> dict:
     """What the prediction rests on: the posterior, the torque history and the options, beside what is said ``about`` it."""
     with args.path.open("rb") as file:
         history = {"file": args.path.name, "sha256": hashlib.file_digest(file, "sha256").hexdigest()}
     own = {"unit": posterior.unit_name, "data_sha256": list(posterior.data_hashes)}
-    digest = read_group(args.posterior, "sample_stats").attrs[SEAL]
     result = {"schema": PREDICTION, **about, "history": history, "posterior_sha256": digest}
     options = {"start": args.start, "draws": args.draws, "extrapolate": args.extrapolate}
     return stamped(result, own, posterior.seed, options)

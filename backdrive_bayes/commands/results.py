@@ -129,13 +129,19 @@ def stamped_by(result: dict, evidences, seed: int | None = None, **options) -> d
     return stamped(result, rests, about["seed"] if seed is None else seed, own | options)
 
 
+@one_thread()
 def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: bool = True, simulated=None):
-    """The diagnosis object of a unit, and posterior and indicators object of the model it chose (None where not asked for).
+    """The diagnosis object of a unit, and posterior and indicators object of the model it chose.
+
+    Without ``sample`` these are None; whether they might be used is examined all the same.
 
     ``simulated`` is the unit of a simulator's answers, of which the diagnosis then says what it lacks.
     """
+    from backdrive_bayes.engine.posterior_file import as_saved
     from backdrive_bayes.gap.diagnose import diagnose
     from backdrive_bayes.gap.simulated import diagnose_simulated
+    from backdrive_bayes.indicators.convergence import convergence_json, examined
+    from backdrive_bayes.indicators.draws import IndicatorDraws
 
     shared: dict = {"seed": options.seed, "k": options.k, "progress": note}
     if simulated is None:
@@ -146,22 +152,25 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
         raise BadInput("--baseline", f"{BASELINE} beside --simulated", ",".join(options.baseline))
     about = options.to_json() | ({"simulated": simulated.name} if simulated else {})
     if not sample:
+        drawn = IndicatorDraws(as_saved(found.posterior), options.k)
+        found.json["convergence"] = convergence_json(examined(drawn, unit, options.level))
         return stamped(found.json, origin(unit), options.seed, about), None
     sampled = fit_unit(unit, options, note, found.posterior)
     found.json["convergence"] = sampled[1]["convergence"]
     return stamped(found.json, origin(unit), options.seed, about), sampled
 
 
-def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=lambda text: None) -> None:
-    """Write posterior.nc, indicators.json with its digest, and figures into ``folder``."""
+def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=lambda text: None) -> str:
+    """Write posterior.nc, indicators.json with its digest, and figures into ``folder``; returns the digest."""
     from backdrive_bayes.engine.posterior_file import write_posterior
 
     note("saving the posterior")
-    digest = write_posterior(posterior, folder / "posterior.nc", result["options"])
+    digest = write_posterior(posterior, folder / "posterior.nc", result)
     write_json(folder / "indicators.json", result | {"posterior_sha256": digest})
     if figures:
         note("figures")
         draw_figures("indicators.json", folder)
+    return digest
 
 
 def keep_run(folder: Path, verb: str, began_s: float) -> None:

@@ -77,6 +77,8 @@ def show_limits(verdict: dict) -> None:
         rows.append([limit, _condition(row), _cell(row, factor), kept, row["verdict"]])
     interval = Column("median [interval]")
     show_table([Column("limit", False), Column(_AT, False), interval, Column("P(kept)"), Column("verdict", False)], rows)
+    if unheld := verdict["structure"]["unknown_probability"]:
+        say(f"P(kept) counts as not kept what no model at hand holds: probability {probability_text(unheld)}")
     for row in verdict["limits"]:
         if found := row["global"]:
             risks = f"consumer's {probability_text(found['consumer'])}, producer's {probability_text(found['producer'])}"
@@ -121,7 +123,7 @@ def show_simulator(found: dict, level: float) -> None:
     say(f"simulator {found['unit']}: {found['summary']}")
     if found["told"]:
         rows = [[words, share_text(found[key])] for key, words in SPLIT.items()]
-        show_table([Column("share of the gap, on data left out", False, 24), Column("share")], rows)
+        show_table([Column("share of the gap, on held-out data", False, 24), Column("share")], rows)
     rows = []
     for row in found["parameters"]:
         size = max(abs(row["simulated"]), *(abs(row["measured"][end]) for end in ("lo", "hi")))

@@ -118,7 +118,8 @@ def _number(claim, part, look_up, along, where):
     value = np.atleast_2d(np.asarray(claim.holds.run_part(node, look_up, along), float).T).T
     if not np.isfinite(value).all():
         # A comparison with NaN would be false and look like an answer.
-        raise NotAvailable(f"{text} is not defined in all draws")
+        share = float(np.mean(~np.isfinite(value).reshape(len(value), -1).all(axis=1)))
+        raise NotAvailable(f"one of its numbers is not defined in {100 * share:.3g} % of the draws")
     lo, median, hi = np.quantile(value, [0.05, 0.5, 0.95], axis=0)
     out = {"what": text, "at": where, "unit": unit, "level": 0.9}
     if value.shape[1] == 1:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.parameters import posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.posterior_read import ARRAYS, BLOCKS, LEGS
@@ -17,12 +18,13 @@ from backdrive_bayes.engine.predictive import block_offsets, replicates
 from backdrive_bayes.results import POSTERIOR, SEAL, digest_of
 
 
-def write_posterior(posterior: Posterior, path: Path, options: dict | None = None) -> str:
+@one_thread()
+def write_posterior(posterior: Posterior, path: Path, about: dict | None = None) -> str:
     """Write the groups posterior, unconstrained_posterior (the weights), sample_stats, posterior_predictive, observed_data and
-    constant_data; angles in rad, torques in N·m. ``options`` are those of the fit, kept as an attribute. Returns the seal, a
-    SHA-256 of everything in the file.
+    constant_data; angles in rad, torques in N·m. ``about`` holds the fit's ``options``, ``findings`` on its data and whether it
+    was ``forced``, kept as attributes. Returns the seal, a SHA-256 of everything in the file.
     """
-    groups = posterior_groups(posterior, options or {})
+    groups = posterior_groups(posterior, about or {})
     seal = digest_of(groups)
     for mode, (name, dataset) in zip("w" + "a" * (len(groups) - 1), groups.items(), strict=True):
         encoding = {v: {"zlib": True, "complevel": 1} for v in dataset.data_vars if dataset[v].dtype.kind == "f"}
@@ -36,11 +38,11 @@ def as_saved(posterior: Posterior) -> Posterior:
     return replace(posterior, weights={n: w.astype(np.float32).astype(float) for n, w in posterior.weights.items()})
 
 
-def posterior_groups(posterior: Posterior, options: dict) -> dict:
+def posterior_groups(posterior: Posterior, about: dict) -> dict:
     """The groups as xarray datasets by name."""
     import xarray
 
-    attributes = attributes_of(posterior, options)
+    attributes = attributes_of(posterior, about)
 
     def dataset(variables):
         return xarray.Dataset(variables, attrs=attributes)
@@ -64,7 +66,7 @@ def software() -> str:
     return "; ".join(f"{p} {version(p)}" for p in packages) + f"; Python {platform.python_version()}"
 
 
-def attributes_of(posterior: Posterior, options: dict) -> dict:
+def attributes_of(posterior: Posterior, about: dict) -> dict:
     """What every group says of the fit; nested values as JSON."""
     context, records, found = posterior.context, posterior.records, posterior.convergence
     return {
@@ -89,7 +91,9 @@ def attributes_of(posterior: Posterior, options: dict) -> dict:
         "doubts": json.dumps(list(posterior.doubts)),
         "acceptance": float(posterior.acceptance),
         "seed": int(posterior.seed),
-        "options": json.dumps(options, sort_keys=True),
+        "options": json.dumps(about.get("options", {}), sort_keys=True),
+        "findings": json.dumps(about.get("findings", []), sort_keys=True),
+        "forced": int(about.get("forced", False)),
         "inference_library": "emcee",
         "inference_library_version": version("emcee"),
         "creation_library": "backdrive_bayes",

@@ -67,6 +67,14 @@ def require_range(posterior: Posterior, torque_nm, extrapolate: bool, where) -> 
         raise BadInput(where, f"torques up to {further if extrapolate else near}", f"{largest:.4g} N·m")
 
 
+def range_caveat(posterior: Posterior, torque_nm) -> str:
+    """What is to be kept in mind of torques beyond those measured; empty where there are none."""
+    largest, highest = float(np.abs(torque_nm).max()), posterior.context.torque_scale_nm
+    if largest <= (1.0 + SLACK) * highest:
+        return ""
+    return f"torques up to {largest:.4g} N·m are beyond the largest measured, {highest:.4g} N·m: the angle there is extrapolated"
+
+
 def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:
     """What is to be kept in mind of a history's loading rate, beside those measured; empty where it is among them.
 

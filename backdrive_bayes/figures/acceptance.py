@@ -58,10 +58,10 @@ def _panel(panel, row):
             end = limit + side * row["guard_band"][guard] * factor
             panel.axvspan(*sorted((limit, end)), color=ORANGE, alpha=0.35, linewidth=0, label="guard band")
             panel.axvline(limit, color=VERMILLION, linestyle=(0, (5, 2)), linewidth=1.4, label="limit")
+    panel.set(xlim=(left, right), ylim=(0, 1.12), yticks=[], xlabel=f"{drawn_words(row['indicator'])} [{unit or '–'}]")
     classic = row["naive"]["value"]
     if classic is not None:
         _mark_classic(panel, classic * factor, left, right)
-    panel.set(xlim=(left, right), ylim=(0, 1.12), yticks=[], xlabel=f"{drawn_words(row['indicator'])} [{unit or '–'}]")
     colour = {"accepted": GREEN, "rejected": VERMILLION}.get(row["verdict"], BLACK)
     predicted = ", predicted" if row["predicted"] else ""
     panel.set_title(f"{loop_words(row)}{predicted}: {row['verdict']}", color=colour)
@@ -76,11 +76,8 @@ def _mark_classic(panel, value, left, right):
     marker = "x" if inside else ">" if value > right else "<"
     panel.plot(at, 0.06, linestyle="none", marker=marker, color=BLACK, clip_on=inside, label="least squares" if inside else None)
     if not inside:
-        side = -1 if value > right else 1
-        panel.annotate(
-            f"least squares\n{value:.3g}", (at, 0.06), xytext=(7 * side, -2), textcoords="offset points",
-            ha="right" if side < 0 else "left", va="bottom", bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 1},
-        )  # fmt: skip
+        # Beside the name of the axis: inside the panel it would lie over the limit or the posterior.
+        panel.set_xlabel(f"{panel.get_xlabel()} (least squares {value:.3g})")
 
 
 def _range(edges, counts, low, high):

@@ -7,13 +7,13 @@ import contextlib
 import functools
 import itertools
 import logging
-import sys
 import threading
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 
+from backdrive_bayes.blind.workers import silence_tracker
 from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.fleet.store import CannotKeep
 
@@ -77,7 +77,7 @@ def local(workers: int) -> Iterator:
     import dask
     from tornado.ioloop import PeriodicCallback
 
-    _silence_tracker()
+    silence_tracker()
     logging.getLogger("tornado.application").setLevel(logging.CRITICAL)
     with dask.config.set(SETTINGS), contextlib.ExitStack() as stack:
         loop = event_loop()
@@ -189,18 +189,6 @@ def run_all(client, function: Callable, items: dict, finished: Callable[[str, ob
 def deaths(error: Exception) -> int:
     """Workers that a call took down before it was given up; 0 where it ended otherwise."""
     return error.allowed_failures + 1 if isinstance(error, _distributed().KilledWorker) else 0
-
-
-def _silence_tracker() -> None:
-    """Start Python's resource tracker so that it says nothing of semaphores that it clears after an interrupted run."""
-    from multiprocessing import resource_tracker
-
-    option = "ignore:resource_tracker"
-    sys.warnoptions.append(option)
-    try:
-        resource_tracker.ensure_running()
-    finally:
-        sys.warnoptions.remove(option)
 
 
 def _outcome(future):

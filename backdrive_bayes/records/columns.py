@@ -95,9 +95,11 @@ def columns_to_paste(headers: tuple[str, ...]) -> str:
 
 
 def _without_unit(headers, kind) -> str:
-    """A header that is called like the channel, or a place-holder, with a unit that its reader has to put right."""
+    """A header that is called like the channel, or a place-holder, with a unit that its reader has to put right: as it stands it
+    is refused, for a guess may be wrong a thousand times."""
     named = [h for h in headers if _bare(h) == kind or is_named(split_unit(h)[0], kind) or is_named(h, kind)]
-    return f"{named[0].strip()[:200] if named else 'NAME'} [{_EXAMPLES[kind]}]"
+    name = (split_unit(named[0])[0] if BRACKETS.match(named[0].strip()) else named[0].strip()) if named else "NAME"
+    return f"{name[:200]} [{_EXAMPLES[kind]}?]"
 
 
 def _default_column(headers, kind, where) -> tuple[str, Quantity]:

@@ -117,7 +117,7 @@ def _jumps(jumps, frozen):
             "error" if several else "warning",
             "angle_jumps",
             f"the angle jumps against its motion by {jumps['size_rad'] * _DEG:.4g}° "
-            f"{jumps['count']} time{'s'[: not several]}, first at sample {jumps['first_sample']}: "
+            f"{jumps['count']} time{'s' * several}, first at sample {jumps['first_sample']}: "
             "an encoder that wraps at no full turn, or one that slips; unwrap it before it is read",
         )
     elif jumps["largest_step_rad"] > LARGEST_STEP_RAD:

@@ -27,6 +27,8 @@ UNITS: dict[str, dict[str, float]] = {
     },
 }
 BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
+WORDED = re.compile(r"^(?P<name>\S.*?)(?:\s+in\s+|\s*/\s*|\s*,\s*)(?P<unit>\S+)$")
+"""A unit after "in", a slash or a comma: "Moment in mNm", "M / mNm"."""
 _SPELLED_ALIKE = str.maketrans({"µ": "u", "μ": "u", "′": "'", "’": "'", "″": '"', "”": '"', "º": "°"})
 _NAMES = {
     "time": "time t zeit zeitstempel messzeit timestamp elapsed temps tiempo tempo tijd čas 时间 時間 时刻",
@@ -72,6 +74,9 @@ def split_unit(spelling: str) -> tuple[str, str]:
     match = BRACKETS.match(spelling)
     if match:
         return match["name"].strip(), (match["square"] or match["round"] or "").strip()
+    match = WORDED.match(spelling)
+    if match and is_unit(match["unit"]):
+        return match["name"], match["unit"]
     name, _, unit = spelling.rpartition("_")
     return (name, unit) if name else (spelling, "")
 

@@ -137,12 +137,14 @@ def _limits(verdict, at_most=None):
     more = f" {left} further limits follow on the next pages." if left > 0 else ""
     lost = any(r["indicator"] == "lost_motion_rad" for r in rows)
     marks = f" {PROVISIONAL}" * _provisional(verdict)
+    unheld = verdict["structure"]["unknown_probability"]
+    counted = f" p_c counts as not kept what no model at hand holds ({probability_text(unheld)})." if unheld else ""
     at_k = f" δ is taken at ±kT_r with k = {verdict['k']:g}." if lost else ""
     return [
         Table(columns, [_limit_cells(r, _provisional(verdict)) for r in rows], [1.3, 0, 1.05, 1.3, 1.25, 0.85, 0.9]),
         Note(
             f"Median [{level_text(verdict['level'])} interval] of the reducer's own settled loop; p_c: conformance "
-            f"probability, with the specific risks (consumer's if accepted / producer's if rejected).{at_k} "
+            f"probability, with the specific risks (consumer's if accepted / producer's if rejected).{counted}{at_k} "
             "Least squares: the classic evaluation's point estimate and where it lies; its branches do not "
             f"close at ±T and friction hides in its offset, so that it may differ by more than the interval.{marks}{more}"
         ),

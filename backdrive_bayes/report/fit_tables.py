@@ -44,16 +44,8 @@ def indicators(saved, at_most: int | None = None) -> list:
 
 
 def indicator_text(key: str, record: dict, factor: float, provisional: bool = False) -> str:
-    """An indicator's interval as text, marked where it is ``provisional``; a ratio of energies ends where it must."""
-    found = record["indicators"].get(key)
-    return marked(ratio_text(found) if key == "dissipation_ratio" else interval_text(found, factor), provisional)
-
-
-def ratio_text(interval: dict | None) -> str:
-    """The dissipation ratio u, which lies in [0, 1]: an interval is cut there, and a median beyond is not defined."""
-    if interval is None or not 0.0 <= interval["median"] <= 1.0:
-        return interval_text(None)
-    return interval_text(interval | {"lo": max(interval["lo"], 0.0), "hi": min(interval["hi"], 1.0)})
+    """An indicator's interval as text, marked where it is ``provisional``."""
+    return marked(interval_text(record["indicators"].get(key), factor), provisional)
 
 
 def _by_record(saved, columns, cells):

@@ -70,5 +70,6 @@ class VerdictFile(Result, kw_only=True):
     k: Probability = 0.03
     level: Probability = 0.9
     rated_torque_Nm: Number = None
+    posterior_sha256: str = ""
     identity: dict[str, str] = field(default_factory=dict)
     reproduction: dict[str, Any] = field(default_factory=dict)

@@ -1,5 +1,6 @@
 """The demo calls every verb with all the options that the verb's own command line has."""
 
+import tomllib
 from argparse import ArgumentParser
 from pathlib import Path
 
@@ -8,7 +9,8 @@ import pytest
 
 from backdrive_bayes.commands import accept, check, compare, demo, diagnose, fit, fleet, report
 
-REPORT = Path(__file__).resolve().parents[2] / "reports" / "demo" / "report.pdf"
+HOME = Path(__file__).resolve().parents[2]
+REPORT = HOME / "reports" / "demo" / "report.pdf"
 PAGES = 16
 VERBS = (check, fit, diagnose, accept, compare, report, fleet)
 
@@ -38,3 +40,12 @@ def test_an_option_that_is_left_out_would_be_seen(monkeypatch):
 
 def test_the_committed_report_is_short():
     assert len(pypdf.PdfReader(REPORT).pages) <= PAGES
+
+
+def test_the_wheel_holds_all_the_packaged_data():
+    """Files that no glob of the project file names are missing where the package is installed, and the demo with them."""
+    globs = tomllib.loads((HOME / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["backdrive_bayes"]
+    held = {path for glob in globs for path in (HOME / "backdrive_bayes").glob(glob)}
+    files = {HOME / "backdrive_bayes" / path.relative_to(HOME) for path in (HOME / "data").rglob("*") if path.is_file()}
+    assert len(files) > 20 and files <= held
+    assert not files <= {path for glob in globs[:-1] for path in (HOME / "backdrive_bayes").glob(glob)}, "a glob too few is seen"

@@ -54,3 +54,19 @@ def test_a_loading_rate_far_from_those_measured_is_a_caveat_and_no_failure(predi
     caveat = result["outcome"]["caveat"]
     assert "10 N·m/s is far from those measured, 0.01 to 0.1 N·m/s" in caveat and caveat in screen
     assert result["outcome"]["exit_code"] == 0
+
+
+def test_a_prediction_from_forced_data_says_so_everywhere(tmp_path, capsys):
+    finding = {"level": "error", "text": "the encoder stands still", "record": "r.csv"}
+    folder = write_evidence(tmp_path / "fit", findings=[finding], forced=True)
+    np.savetxt(tmp_path / "h.csv", [[0, 0], [1, 0.05]], delimiter=",", header="time_s,torque_Nm", comments="")
+    assert main(["predict", str(folder / "posterior.nc"), str(tmp_path / "h.csv"), "-o", str(tmp_path / "p")]) == 0
+    result, screen = json.loads((tmp_path / "p" / "prediction.json").read_text()), capsys.readouterr().out
+    assert result["forced"] and result["findings"] == [finding]
+    assert "forced" in result["outcome"]["caveat"] and "forced" in screen and "the encoder stands still" in screen
+
+
+def test_torque_beyond_the_measured_is_a_caveat(predicted):
+    result, screen = predicted("--extrapolate", largest=0.11)
+    assert "0.11 N·m are beyond the largest measured, 0.1 N·m" in result["outcome"]["caveat"]
+    assert "extrapolated" in screen

@@ -6,8 +6,9 @@ import pytest
 from support.decided import evidence
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from backdrive_bayes.commands import results
 from backdrive_bayes.decisions import acceptance, comparison
-from backdrive_bayes.engine import infer, prediction
+from backdrive_bayes.engine import infer, posterior_file, prediction
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.gap import averaged, diagnose
 from backdrive_bayes.pooling import pool
@@ -46,6 +47,8 @@ class Reached(Exception):
         (comparison, "unique_names", lambda: comparison.compare([evidence(), evidence()])),
         (averaged, "weighed_unit", lambda: averaged.fit_posterior(None)),
         (diagnose, "examine", lambda: diagnose.diagnose(None)),
+        (diagnose, "diagnose", lambda: results.diagnose_unit(None, results.FitOptions())),
+        (posterior_file, "posterior_groups", lambda: posterior_file.write_posterior(None, "")),
         (pool, "_comparable", lambda: pool.pool_batch("a", [])),
     ],
     ids=lambda v: getattr(v, "__name__", "") if not isinstance(v, str) else v,

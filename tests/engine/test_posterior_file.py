@@ -23,7 +23,7 @@ def posterior():
 @pytest.fixture(scope="module")
 def path(posterior, tmp_path_factory):
     found = tmp_path_factory.mktemp("file") / "posterior.nc"
-    write_posterior(posterior, found, {"k": 0.03})
+    write_posterior(posterior, found, {"options": {"k": 0.03}})
     return found
 
 
@@ -53,7 +53,7 @@ def test_any_history_gives_the_same_angles_to_the_last_bit(posterior, path):
 
 
 def test_the_same_posterior_gives_the_same_bytes(posterior, path, tmp_path):
-    write_posterior(posterior, tmp_path / "again.nc", {"k": 0.03})
+    write_posterior(posterior, tmp_path / "again.nc", {"options": {"k": 0.03}})
     assert (tmp_path / "again.nc").read_bytes() == path.read_bytes()
 
 

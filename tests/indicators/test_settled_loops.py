@@ -8,6 +8,7 @@ from support.made_posterior import known, made_posterior
 
 from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators import loop
+from backdrive_bayes.indicators.draws import core_indicators
 from backdrive_bayes.indicators.loop import loop_grid, module_loops, settled_loops, torque_grid
 from backdrive_bayes.mechanics.registry import LIBRARY
 
@@ -95,3 +96,12 @@ def test_effects_of_the_reducer_are_part_of_its_loop_and_those_of_the_channel_ar
 
 def _short(posterior):
     return loop.settled_history(torque_grid(T), RATE, posterior.context.torque_scale_nm)
+
+
+def test_the_dissipation_ratio_lies_in_its_range():
+    """S beyond the absorbed energy, or below nothing, is noise: u = S / W_abs is neither above 1 nor below 0."""
+    torque = np.linspace(-1.0, 1.0, 5)
+    rising = np.array([[-1.0, -0.5, 0.0, 0.5, 1.0]])
+    for width, expected in ((3.0, 1.0), (-0.5, 0.0)):
+        falling = rising + width * np.array([0.0, 1.0, 1.0, 1.0, 0.0])
+        assert core_indicators(loop.Loops(torque, rising, falling), 0.5)["dissipation_ratio"] == expected

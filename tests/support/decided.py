@@ -89,12 +89,13 @@ def evidence(name="u", loops=LOOPS, spread=0.01, seed=0, converged=True, diagnos
     return Evidence(_about(name, loops, converged, k, effects), draws, diagnosis, name)
 
 
-def write_evidence(folder, name="u", loops=LOOPS, diagnosis=None, converged=True, effects=(), seed=0, size=1.0):
-    """A result folder of a made fit, ``size`` times as large in angle; returns the folder."""
+def write_evidence(folder, name="u", loops=LOOPS, diagnosis=None, converged=True, effects=(), seed=0, size=1.0, **more):
+    """A result folder of a made fit, ``size`` times as large in angle, with ``more`` keys of its indicators object."""
     from backdrive_bayes.commands.results import keep_fit
 
     folder.mkdir(parents=True, exist_ok=True)
     posterior, about = made_fit(name, tuple(loops), seed, size)
+    about |= more
     about["model"]["effects"] = list(effects)
     about["convergence"] |= {"converged": converged, "advice": "" if converged else "not converged within the budget"}
     keep_fit(posterior, told(about), folder, figures=False)
