@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+ARCMIN_PER_RAD = 10800.0 / math.pi
+"""Inside all angles are in rad; screens and files show arcminutes."""
 MOST_DECIMALS = 8
 UNDEFINED = "not defined"
 _LARGEST_PLAIN = 1e7  # longer numbers are not read at a glance

@@ -54,7 +54,8 @@ def one_unit(folder: Path, truth: dict) -> dict:
     """By indicator: the share of draws below the truth and the relative half width of the 90 % interval, a row a record."""
     began = time.process_time()
     posterior, result = fit_unit(read_unit(folder), FitOptions())
-    draws, found = IndicatorDraws(posterior, FitOptions().k), {name: [] for name in TRUTH}
+    draws = IndicatorDraws(posterior, FitOptions().k)
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in TRUTH}
     for record in result["records"]:
         rate, amplitude = record["loading_rate_Nm_per_s"], record["amplitude_Nm"]
         true = next(r["indicators"] for r in truth["records"] if r["file"] == record["file"])
@@ -91,8 +92,8 @@ def coverage(units: list[dict], name: str, level: float) -> float:
 
 def bounds(units: int, level: float) -> tuple[float, float]:
     """99 % binomial bounds of that many independent units; records of one unit count as one."""
-    low, high = binom.ppf([0.005, 0.995], units, level) / units
-    return float(low), float(high)
+    low, high = (float(binom.ppf(q, units, level)) / units for q in (0.005, 0.995))
+    return low, high
 
 
 def page(args) -> None:
@@ -120,7 +121,8 @@ def _tables(benches, title, levels) -> list[str]:
     lines += ["| bench | level | " + " | ".join(TRUTH) + " | mean | 99 % bounds |", "|---" * (len(TRUTH) + 4) + "|"]
     for bench, units in benches.items():
         for level in levels:
-            found, (low, high) = [coverage(units, n, level) for n in TRUTH], bounds(len(units), level)
+            found = [coverage(units, n, level) for n in TRUTH]
+            low, high = bounds(len(units), level)
             out = [not low <= c <= high for c in found]
             outside, cells = outside + sum(out), cells + len(out)
             shown = [f"**{c:.2f}**" if o else f"{c:.2f}" for c, o in zip(found, out, strict=True)]

@@ -6,10 +6,9 @@ from pathlib import Path
 
 from backdrive_bayes.commands.output import complain, default_out, say, write_folder, write_json
 from backdrive_bayes.commands.results import origin, stamped
-from backdrive_bayes.number_text import with_error
+from backdrive_bayes.number_text import ARCMIN_PER_RAD, with_error
 
 HELP = "read and judge a unit's records: samples, branches, cycles, closure, noise"
-_ARCMIN = 10800.0 / 3.141592653589793
 
 
 def add_arguments(parser) -> None:
@@ -60,9 +59,9 @@ def _extent(record: dict) -> str:
 
 
 def _levels(noise: dict) -> str:
-    correlated = f"{noise['correlated_rad'] * _ARCMIN:.2g}′ over {noise['correlation_time_s'] * 1e3:.3g} ms"
+    correlated = f"{noise['correlated_rad'] * ARCMIN_PER_RAD:.2g}′ over {noise['correlation_time_s'] * 1e3:.3g} ms"
     return (
-        f"angle noise {noise['white_rad'] * _ARCMIN:.2g}′ white, {correlated}; "
+        f"angle noise {noise['white_rad'] * ARCMIN_PER_RAD:.2g}′ white, {correlated}; "
         f"torque noise {noise['torque_Nm']:.2g} N·m"
     )
 
@@ -78,11 +77,11 @@ def _measured(loop: dict) -> str:
 
 
 def _angle(name: str, loop: dict, key: str) -> str:
-    return f"{name} = {with_error(loop[key] * _ARCMIN, loop[f'{key}_sd'] * _ARCMIN, '′')}"
+    return f"{name} = {with_error(loop[key] * ARCMIN_PER_RAD, loop[f'{key}_sd'] * ARCMIN_PER_RAD, '′')}"
 
 
 def _closure(record: dict) -> str:
     closure = record["closure"]
     if closure is None:
         return ""
-    return f"; loop closes to {with_error(closure['difference_rad'] * _ARCMIN, closure['sd_rad'] * _ARCMIN, '′')}"
+    return f"; loop closes to {with_error(closure['difference_rad'] * ARCMIN_PER_RAD, closure['sd_rad'] * ARCMIN_PER_RAD, '′')}"

@@ -11,10 +11,10 @@ from backdrive_bayes.commands.output import say, write_folder, write_json
 from backdrive_bayes.commands.results import stamped
 from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 from backdrive_bayes.results import PREDICTION, SEAL, read_group
 
 HELP = "angle with 90 % interval for a torque history, from a posterior"
-RAD_TO_ARCMIN = 10800.0 / 3.141592653589793
 DRAWS = 400
 NOISY = "the torque history is noisy: it was made monotone between its turning points before it drives the model"
 
@@ -51,7 +51,7 @@ def run(args) -> int:
     require_range(posterior, torque, args.extrapolate, args.path)
     if not 0 <= args.draws <= DRAWS:
         raise BadInput("--draws", f"a number from 0 to {DRAWS}", args.draws)
-    curves = predict_angles(posterior, time, torque, args.start, DRAWS) * RAD_TO_ARCMIN
+    curves = predict_angles(posterior, time, torque, args.start, DRAWS) * ARCMIN_PER_RAD
     bounds = np.stack([curves.mean(axis=0), *np.quantile(curves, [0.05, 0.95], axis=0)])
     out = args.out or Path(f"{args.path.stem}-predict")
     header = "time_s,torque_Nm,angle_mean_arcmin,angle_lo90_arcmin,angle_hi90_arcmin"

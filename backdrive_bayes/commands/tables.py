@@ -7,10 +7,17 @@ import re
 
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.screen import Column, show_table, width
-from backdrive_bayes.number_text import interval_text, level_text, like_interval, marked, probability_text, share_text
+from backdrive_bayes.number_text import (
+    ARCMIN_PER_RAD,
+    interval_text,
+    level_text,
+    like_interval,
+    marked,
+    probability_text,
+    share_text,
+)
 from backdrive_bayes.results import usable
 
-ARCMIN_PER_RAD = 10800.0 / math.pi
 ONE_LINE = 110
 """Columns from which an interval stands beside its median; below it stands under it."""
 LEAST_SHOWN = 0.005

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.figures.style import (
-    ARCMIN_PER_RAD,
     BLUE,
     GREY,
     MJ_PER_J,
@@ -20,6 +19,7 @@ from backdrive_bayes.figures.style import (
     reach,
     styled,
 )
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 
 LOOPS = "Settled loops of the units at the same rate and amplitude, each about its middle: median and interval of each."
 ENERGY = "Torque–energy curves of the units at the same rate and amplitude: median and interval of each."

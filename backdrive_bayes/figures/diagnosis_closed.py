@@ -7,7 +7,6 @@ from typing import Any
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import drawable
 from backdrive_bayes.figures.style import (
-    ARCMIN_PER_RAD,
     BLUE,
     GREY,
     ORANGE,
@@ -17,7 +16,7 @@ from backdrive_bayes.figures.style import (
     new_figure,
     styled,
 )
-from backdrive_bayes.number_text import share_text
+from backdrive_bayes.number_text import ARCMIN_PER_RAD, share_text
 
 CAPTION = (
     "Closed fraction of the gap on held-out data: value and interval of each record and of all of them, with "

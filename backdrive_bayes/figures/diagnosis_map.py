@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, BLUE, GREY, VERMILLION, few_ticks, matplotlib, new_figure, styled
+from backdrive_bayes.figures.style import BLUE, GREY, VERMILLION, few_ticks, matplotlib, new_figure, styled
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 
 CAPTION = (
     "Gap map: what the baseline leaves of the measured angle, over torque, for loading and unloading of every "

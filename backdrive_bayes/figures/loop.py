@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from backdrive_bayes.figures.saved import Saved, record_blocks
 from backdrive_bayes.figures.style import (
-    ARCMIN_PER_RAD,
     FALLING,
     FIRST,
     GREY,
@@ -16,6 +15,7 @@ from backdrive_bayes.figures.style import (
     record_labels,
     styled,
 )
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 
 CAPTION = (
     "Measured angle against torque (block means, encoder offset removed) with the reducer's settled loop: "

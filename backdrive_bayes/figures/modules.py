@@ -6,7 +6,6 @@ import numpy as np
 
 from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import (
-    ARCMIN_PER_RAD,
     FALLING,
     RISING,
     few_ticks,
@@ -16,6 +15,7 @@ from backdrive_bayes.figures.style import (
     styled,
     words,
 )
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 
 CAPTION = (
     "The settled loop as the sum of its modules (median curves) and of the effects, which are the loop minus the sum of the "

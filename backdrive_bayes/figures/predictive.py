@@ -6,7 +6,6 @@ import numpy as np
 
 from backdrive_bayes.figures.saved import Saved, record_blocks
 from backdrive_bayes.figures.style import (
-    ARCMIN_PER_RAD,
     BLACK,
     BLUE,
     GREY,
@@ -16,6 +15,7 @@ from backdrive_bayes.figures.style import (
     record_labels,
     styled,
 )
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 
 CAPTION = (
     "Posterior predictive check. Left: distribution of the measured blocks' ranks among replicated blocks, "

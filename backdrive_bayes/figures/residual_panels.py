@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, FALLING, GREY, RISING, TORQUE_TICKS, few_ticks
+from backdrive_bayes.figures.style import FALLING, GREY, RISING, TORQUE_TICKS, few_ticks
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 
 Curve = Callable[..., None]
 """Draws one direction: ``curve(axes, torque, angle, own, look, name)``, arrays (blocks,), angle in arcmin."""

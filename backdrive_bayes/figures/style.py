@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from functools import partial
 
 from backdrive_bayes.errors import MissingExtra
+from backdrive_bayes.number_text import ARCMIN_PER_RAD
 
 try:
     with warnings.catch_warnings():
@@ -26,7 +27,6 @@ WIDTH_IN = 170 / 25.4
 """Width of every figure: the text width of an A4 page with 20 mm margins, so that font sizes print as they are set."""
 
 PNG_DPI = 150
-ARCMIN_PER_RAD = 180 * 60 / math.pi
 MJ_PER_J = 1e3
 PER_FIGURE = 3
 """Records side by side in one figure; more records make more figures."""

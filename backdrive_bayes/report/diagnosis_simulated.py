@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_words import parameter_words
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, in_words, shown_unit
-from backdrive_bayes.number_text import interval_text, level_text, like_interval, share_text, significant
+from backdrive_bayes.figures.style import in_words, shown_unit
+from backdrive_bayes.number_text import ARCMIN_PER_RAD, interval_text, level_text, like_interval, share_text, significant
 from backdrive_bayes.report.blocks import Block, Heading, Note, Paragraph, Picture, Table
 from backdrive_bayes.report.text import free
 

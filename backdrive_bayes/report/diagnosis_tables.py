@@ -11,8 +11,17 @@ from backdrive_bayes.figures.diagnosis_words import (
     parameter_words,
     signed,
 )
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, shown_unit
-from backdrive_bayes.number_text import decimals, fixed, interval_text, level_text, probability_text, share_text, significant
+from backdrive_bayes.figures.style import shown_unit
+from backdrive_bayes.number_text import (
+    ARCMIN_PER_RAD,
+    decimals,
+    fixed,
+    interval_text,
+    level_text,
+    probability_text,
+    share_text,
+    significant,
+)
 from backdrive_bayes.report.blocks import Note, Paragraph, Table
 from backdrive_bayes.report.fit_tables import INDICATORS
 from backdrive_bayes.report.text import free

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backdrive_bayes.figures.style import ARCMIN_PER_RAD, MJ_PER_J, PER_FIGURE, parts, record_labels, shown_unit, words
-from backdrive_bayes.number_text import fixed, interval_text, level_text, marked, significant
+from backdrive_bayes.figures.style import MJ_PER_J, PER_FIGURE, parts, record_labels, shown_unit, words
+from backdrive_bayes.number_text import ARCMIN_PER_RAD, fixed, interval_text, level_text, marked, significant
 from backdrive_bayes.report.blocks import Note, Table
 from backdrive_bayes.report.findings import FORCED, PROVISIONAL
 from backdrive_bayes.report.text import free
