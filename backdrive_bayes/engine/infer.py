@@ -25,6 +25,9 @@ POWER = 0.4
 114, 2019): no reducer is quite of the class. Chosen on the clean units of two benches with an earlier form of the class;
 reports/interval-coverage says how often intervals hold the truth with it now."""
 
+REACHED = 0.03
+"""Share by which the amplitude that was reached may miss the declared one."""
+
 
 def library_terms():
     """Every term of every listed effect, and what every bench has."""
@@ -81,5 +84,11 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
 
 def _facts(reduced: Reduced) -> RecordFacts:
     rate = reduced.context.rate * reduced.torque_scale_nm
-    amplitude = np.array([np.abs(b.turning_nm).max() for b in reduced.blocks])
+    pairs = zip(reduced.blocks, reduced.unit.records, strict=True)
+    amplitude = np.array([_amplitude(blocks.amplitude_nm, record.amplitude_nm) for blocks, record in pairs])
     return RecordFacts(tuple(b.name for b in reduced.blocks), rate, amplitude, reduced.blocks, reduced.noise)
+
+
+def _amplitude(reached_nm: float, declared_nm: float | None) -> float:
+    """Amplitude of the loop whose indicators a record is asked for: the declared one where the torque reached it."""
+    return declared_nm if declared_nm and abs(reached_nm / declared_nm - 1.0) <= REACHED else reached_nm

@@ -253,16 +253,20 @@ def _apart(starts, context):
 
 
 def _refined(linear) -> np.ndarray | None:
-    """Knots with those intervals split in four in which settled blocks leave a conspicuous residual; None if nothing
-    is gained."""
+    """Knots with those intervals split in four in which settled blocks leave a conspicuous residual, the worst first until there
+    are MOST_KNOTS; None if nothing is gained.
+    """
     reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
     for blocks, white in zip(reduced.blocks, linear.residuals(), strict=True):
         low, high = np.abs(blocks.edges_nm()) / reduced.torque_scale_nm
         for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & (blocks.leg > 0)).tolist():
-            for j in range(max(i - 1, 0), min(i + 2, white.size)):
-                wanted.append(np.linspace(low[j], high[j], 5))
-    if not wanted:
-        return None
-    inner = np.unique(np.concatenate([knots[:-1], *wanted]))
-    found = spaced(np.r_[inner[inner < TOP], TOP], 0.8 * LEAST_APART * reduced.context.torque_noise)
-    return found if knots.size < found.size <= MOST_KNOTS else None
+            about = range(max(i - 1, 0), min(i + 2, white.size))
+            wanted.append((abs(white[i]), np.concatenate([np.linspace(low[j], high[j], 5) for j in about])))
+    wanted.sort(key=lambda pair: -pair[0])
+    least, found = 0.8 * LEAST_APART * reduced.context.torque_noise, knots
+    for _, more in wanted:
+        inner = np.unique(np.r_[found[:-1], more])
+        finer = spaced(np.r_[inner[inner < TOP], TOP], least)
+        if finer.size <= MOST_KNOTS:
+            found = finer
+    return found if found.size > knots.size else None

@@ -91,7 +91,7 @@ def _records(found: Found):
     reduced = found.linear.reduced
     rate = reduced.context.rate * reduced.torque_scale_nm
     return [
-        {"file": b.name, "loading_rate_Nm_per_s": float(v), "amplitude_Nm": float(np.abs(b.turning_nm).max())}
+        {"file": b.name, "loading_rate_Nm_per_s": float(v), "amplitude_Nm": b.amplitude_nm}
         for b, v in zip(reduced.blocks, rate, strict=True)
     ]
 

@@ -57,9 +57,10 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     pieces = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
     sampled, edges = sampled - lag_s, pieces[blocks.count > FEW].ravel() - lag_s
     cuts = np.unique(np.r_[edges, sampled, turns[1:-1], pieces[[0, -1], [0, -1]] - lag_s])
-    owner = np.searchsorted(blocks.begin_s - lag_s, 0.5 * (cuts[1:] + cuts[:-1]), side="right") - 1
-    owner = np.clip(owner, 0, blocks.count.size - 1)
-    span = np.diff(cuts) * (blocks.count[owner] > FEW)
+    middle = 0.5 * (cuts[1:] + cuts[:-1])
+    owner = np.clip(np.searchsorted(blocks.begin_s - lag_s, middle, side="right") - 1, 0, blocks.count.size - 1)
+    # What passes in a gap between two blocks is in the mean of neither.
+    span = np.diff(cuts) * ((blocks.count[owner] > FEW) & (middle < blocks.end_s[owner] - lag_s))
     weight = span / np.maximum(np.bincount(owner, span, blocks.count.size)[owner], 1e-300)
     # A sample is a segment without length, after the one that leads to it.
     t0, t1 = np.r_[cuts[:-1], sampled], np.r_[cuts[1:], sampled]

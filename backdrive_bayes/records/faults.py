@@ -21,14 +21,18 @@ _HELD_SHARE, _HELD_SAMPLES, _HELD_CHANCE = 0.03, 10, 1e-6
 # The same, more than a turning point's; samples below which no channel is said to be held; expected runs of the noise alone
 
 
+def gaps_after(time_s: np.ndarray) -> np.ndarray:
+    """Numbers of the samples after which the time steps much further than around them, (gaps,)."""
+    steps = np.diff(time_s)
+    if not steps.size or steps.max() <= _GAP_STEPS * np.median(steps):
+        return np.zeros(0, int)
+    usual = np.maximum(median_filter(steps, 51, mode="nearest"), np.finfo(float).tiny)
+    return np.flatnonzero(steps > _GAP_STEPS * usual)
+
+
 def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:
     """Time steps far longer than those around them, with the share of the torque range passed meanwhile."""
-    steps = np.diff(time_s)
-    if steps.max() <= _GAP_STEPS * np.median(steps):
-        return []
-    usual = np.maximum(median_filter(steps, 51, mode="nearest"), np.finfo(float).tiny)
-    span = float(np.ptp(torque_nm))
-    at = np.flatnonzero(steps > _GAP_STEPS * usual)
+    steps, span, at = np.diff(time_s), float(np.ptp(torque_nm)), gaps_after(time_s)
     return [
         {"at_s": float(time_s[k]), "seconds": float(steps[k]), "torque_share": float(abs(torque_nm[k + 1] - torque_nm[k]) / span)}
         for k in at[:_MOST_LISTED]

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.faults import gaps_after
 from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle, zero_reach
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
@@ -65,7 +66,9 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
         amplitude_nm=found.amplitude_nm,
         drift_rad=float(drift @ record.angle_rad),
         loop_area_j=float(area @ record.angle_rad),
-        loop_area_j_sd=float(np.hypot(_angle_error(record, area, noise), _torque_error(record, found, noise))),
+        loop_area_j_sd=float(
+            np.linalg.norm([_angle_error(record, area, noise), _torque_error(record, found, noise), _gap_error(record, found)])
+        ),
         half_peak_to_peak_rad=float(height @ record.angle_rad),
         half_peak_to_peak_rad_sd=float(np.hypot(_angle_error(record, height, noise), _corner_error(found))),
         zero_torque_width_rad=width,
@@ -117,6 +120,14 @@ def _corner_error(found) -> float:
     """What half a sample at the turning points is worth: noise moves them, and either way the tip is read too low."""
     samples = np.mean([stop - start for start, stop in found.bounds])
     return found.slope_rad_per_nm * 2.0 * found.amplitude_nm / float(samples)
+
+
+def _gap_error(record: Record, found) -> float:
+    """Standard error of the mean area from gaps: between their ends the path may take either corner, or any way between."""
+    at = gaps_after(record.time_s)
+    corners = np.abs(np.diff(record.torque_nm)[at] * np.diff(record.angle_rad)[at])
+    inside = [(at >= start) & (at < stop) for start, stop in found.bounds]
+    return float(np.sqrt(sum(np.sum(corners[own] ** 2) for own in inside) / 12.0)) / len(found.bounds)
 
 
 def _torque_error(record: Record, found, noise: NoiseEstimate) -> float:

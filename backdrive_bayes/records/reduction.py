@@ -12,11 +12,23 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.optimize import isotonic_regression
 
+from backdrive_bayes.records.faults import gaps_after
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.record import Record
 
+SAME_TIP = 0.05
+"""Turning points that differ by less, in shares of the largest torque, are of the same tips."""
 FEW = 6
 """Samples up to which a block's mean is that of its samples: the steps between them are then no part of what was read."""
+MOST_KINKS = 12
+"""Kinks of a leg's torque at most: a dwell has two, a rounded tip a few."""
+CLEARLY = 10.0
+"""Gain in twice the log likelihood, beyond what its parameters cost, for which a more winding torque path is believed."""
+NEAR = 1 / 16
+RADII = np.r_[0.0, 0.5 ** np.arange(11.0, 4.0, -1.0)]
+RADII_PRIOR = np.r_[0.5, np.full(7, 0.5 / 7)]
+"""Share of a leg near its tips in which rounding is looked for, its radii in shares of the leg's duration, and their prior: as
+many benches turn at once as do not."""
 HALVINGS = 3
 """How often the blocks next to a turning point are halved, down to FEW samples: the peak is the angle of a point, block means are
 not."""
@@ -51,6 +63,12 @@ class Blocks:
         """Time at the middle of each block [s]."""
         return 0.5 * (self.begin_s + self.end_s)
 
+    @property
+    def amplitude_nm(self) -> float:
+        """Mean |torque| of the turning points that are about as far out as the farthest [N·m]."""
+        reached = np.abs(self.turning_nm)
+        return float(reached[reached > (1.0 - SAME_TIP) * reached.max()].mean())
+
     def edges_nm(self) -> np.ndarray:
         """Torque at the beginning and the end of each block along the path [N·m], shape (2, blocks)."""
         edges = np.empty((2, self.torque_nm.size))
@@ -71,10 +89,13 @@ def reduce_record(record: Record, segments, noise: NoiseEstimate, blocks_per_seg
     step = float(np.median(np.diff(record.time_s)))
     span = np.ptp(record.torque_nm)
     edges, leg = [], []
+    # No block reaches over a gap: its mean would be of one end or the other.
+    gaps = gaps_after(record.time_s) + 1
     for k, s in enumerate(segments):
         part = np.ptp(record.torque_nm[s.start : s.stop]) / span
         wanted = int(np.ceil(blocks_per_segment * max(part, 0.1)))
         cut = s.start + _block_edges(record.angle_rad[s.start : s.stop], wanted, noise)
+        cut = np.union1d(cut, gaps[(gaps > s.start) & (gaps < s.stop)])
         edges.append(cut[:-1])
         leg += [k] * (cut.size - 1)
     starts = np.concatenate(edges)
@@ -124,15 +145,18 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
     mean = np.add.reduceat(record.torque_nm, starts) / count
     mid = np.add.reduceat(record.time_s, starts) / count
     path, variance, common = np.empty((3, mean.size))
-    ends = np.empty((len(segments), 2))
     # Turning points lie between the last sample of one segment and the first of the next.
     inner = [0.5 * (record.time_s[s.start - 1] + record.time_s[s.start]) for s in segments[1:]]
     corner = np.r_[record.time_s[0], inner, record.time_s[-1]]
+    trends = []
     for k, s in enumerate(segments):
         own = leg == k
-        bounds = record.time_s[[s.start, s.stop - 1]]
-        trend = _trend(mid[own], mean[own], count[own], torque_sd, bounds)
-        level, at_ends = trend(mid[own]), trend(corner[k : k + 2])
+        trends.append(_trend(mid[own], mean[own], count[own], torque_sd, record.time_s[[s.start, s.stop - 1]]))
+    trends = _rounded(record, segments, trends, corner, torque_sd)
+    ends = np.array([trend(corner[k : k + 2]) for k, trend in enumerate(trends)])
+    for k, s in enumerate(segments):
+        own = leg == k
+        level = trends[k](mid[own])
         excess = np.mean(count[own] * (mean[own] - level) ** 2) / max(torque_sd, 1e-300) ** 2 - 1
         # Wiener weight of a block mean against the trend: what varies beyond the sensor's white noise is real torque.
         keep = max(excess, 0.0) / (max(excess, 0.0) + 1.0) if excess > 5 / np.sqrt(own.sum()) else 0.0
@@ -140,7 +164,6 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
         path[own] = isotonic_regression(s.direction * level, weights=count[own]).x * s.direction
         variance[own] = torque_sd**2 * (keep / count[own] + 2.0 / count[own].sum())
         common[own] = torque_sd**2 / count[own].sum()
-        ends[k] = at_ends
     turning = np.r_[ends[0, 0], 0.5 * (ends[:-1, 1] + ends[1:, 0]), ends[-1, 1]]
     for k in range(len(segments)):
         own = leg == k
@@ -148,19 +171,78 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
     return path, variance, common, turning
 
 
+def _rounded(record, segments, trends, corner, torque_sd):
+    """The trends (functions of time, one a leg) less what rounded tips lack.
+
+    A ramp of slope s that turns within a radius ρ of time lacks s(√(x² + ρ²) - |x|) at the distance x from its tip. All tips of a
+    record are rounded alike; radii, and no rounding, are averaged over by their likelihood in the samples near the tips.
+    """
+    longest = max(record.time_s[s.stop - 1] - record.time_s[s.start] for s in segments)
+    reach, radii, chi2, tips = NEAR * longest, longest * RADII, np.zeros(RADII.size), []
+    for k, (s, trend) in enumerate(zip(segments, trends, strict=True)):
+        time, torque = record.time_s[s.start : s.stop], record.torque_nm[s.start : s.stop]
+        # The first and the last sample of a record are no tips.
+        for tip, inward in ((corner[k], 1.0),) * (k > 0) + ((corner[k + 1], -1.0),) * (k + 1 < len(segments)):
+            slope = (trend(tip) - trend(tip + inward * reach)) / reach
+            near = np.abs(time - tip) <= reach
+            left = torque[near] - trend(time[near])
+            chi2 += [np.sum((left + _lacks(time[near] - tip, slope, r)) ** 2) / max(torque_sd, 1e-300) ** 2 for r in radii]
+            tips.append((k, tip, slope))
+    share = RADII_PRIOR * np.exp(-0.5 * (chi2 - chi2.min()))
+    share /= share.sum()
+
+    def less(k):
+        own = [(tip, slope) for leg, tip, slope in tips if leg == k]
+        lacks = lambda t: sum(w * _lacks(t - tip, slope, r) for tip, slope in own for w, r in zip(share, radii, strict=True))  # noqa: E731
+        return lambda t: trends[k](t) - lacks(t)
+
+    return [less(k) for k in range(len(segments))]
+
+
+def _lacks(apart, slope, radius):
+    """What a ramp lacks at times ``apart`` from its rounded tip."""
+    return slope * (np.hypot(apart, radius) - np.abs(apart))
+
+
 def _trend(time, mean, count, torque_sd, bounds):
-    """A line through the block means, or a cubic spline with more pieces where the noise says that a line is not enough."""
+    """A line through the block means, one with kinks (dwells, rounded tips), or a cubic spline (a torque that sways): whichever
+    the noise asks for.
+    """
     weight = np.sqrt(count) / max(torque_sd, 1e-6 * np.ptp(mean) + 1e-300)
     best, best_score = None, np.inf
-    for pieces in (1, 8, 32):
-        degree = 1 if pieces == 1 else 3
-        if time.size < 3 * (pieces + degree):
-            break
-        inner = np.quantile(time, np.linspace(0, 1, pieces + 1))[1:-1]
-        knots = np.r_[[bounds[0]] * (degree + 1), inner, [bounds[1]] * (degree + 1)]
-        spline = make_lsq_spline(time, mean, knots, degree, w=weight)
-        misfit = np.sum((weight * (mean - spline(time))) ** 2)
-        score = misfit + (pieces + degree) * np.log(time.size)
-        if score < best_score - 10:
+    for spline in _splines(time, mean, weight, bounds):
+        score = np.sum((weight * (mean - spline(time))) ** 2) + (spline.c.size + spline.t.size) * np.log(time.size)
+        if score < best_score - CLEARLY:
             best, best_score = spline, score
     return best if best is not None else (lambda t: np.interp(t, time, mean))
+
+
+def _splines(time, mean, weight, bounds):
+    """Lines with no kink, one, two, … each put where the last one leaves most, and cubic splines of even pieces."""
+    kinks: list[float] = []
+    while time.size >= 3 * (len(kinks) + 2) and len(kinks) <= MOST_KINKS:
+        inner = np.sort(kinks)
+        line = make_lsq_spline(time, mean, np.r_[[bounds[0]] * 2, inner, [bounds[1]] * 2], 1, w=weight)
+        yield line
+        left = weight * (mean - line(time))
+        if np.sum(left**2) < time.size:
+            return
+        kinks.append(_kink(time, left, weight, np.r_[bounds[0], inner, bounds[1]]))
+    for pieces in (8, 32):
+        if time.size >= 3 * (pieces + 3):
+            inner = np.quantile(time, np.linspace(0, 1, pieces + 1))[1:-1]
+            yield make_lsq_spline(time, mean, np.r_[[bounds[0]] * 4, inner, [bounds[1]] * 4], 3, w=weight)
+
+
+def _kink(time, left, weight, knots) -> float:
+    """Where in the piece that fits worst one more kink takes most of what is ``left`` (blocks,), already weighted."""
+    piece = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, knots.size - 2)
+    sizes = np.bincount(piece, minlength=knots.size - 1)
+    misfit = np.where(sizes >= 4, np.bincount(piece, left**2, knots.size - 1), -1.0)
+    own = piece == int(np.argmax(misfit))
+    at, w = time[own], weight[own]
+    ramp = np.linalg.qr(w[:, None] * np.stack([np.ones(at.size), at - at.mean()], axis=1))[0]
+    hinges = w[:, None] * np.maximum(at[:, None] - at[None, 1:-1], 0.0)
+    hinges -= ramp @ (ramp.T @ hinges)
+    gains = (left[own] @ hinges) ** 2 / np.maximum(np.sum(hinges**2, axis=0), 1e-300)
+    return float(at[1:-1][np.argmax(gains)])
