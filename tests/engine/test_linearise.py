@@ -122,6 +122,22 @@ def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
     assert refined.solution.log_marginal + refined.data.log_volume > coarse.solution.log_marginal + coarse.data.log_volume + 10
 
 
+def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_first(monkeypatch, clean):
+    """Once, a residual that asked for more knots than there may be got none at all."""
+    worst = [np.zeros(r.size) for r in clean.residuals()]
+    first = int(np.flatnonzero(clean.reduced.blocks[0].leg == 1)[20])
+    worst[0][clean.reduced.blocks[0].leg > 0] = 4.0
+    worst[0][first] = 9.0
+    monkeypatch.setattr(engine, "MOST_KNOTS", clean.reducer.knots.size + 20)
+    monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
+    found = engine._refined(clean)
+    low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
+    assert clean.reducer.knots.size < found.size <= engine.MOST_KNOTS
+    new = np.setdiff1d(found, clean.reducer.knots)
+    width = high - low
+    assert np.any((new > low - width) & (new < high + width))
+
+
 def test_little_is_trusted_before_the_first_reversal(clean):
     """A record from rest is trusted from its first turning point on; one that begins at its largest torque throughout."""
     for blocks, trust in zip(clean.reduced.blocks, clean.reduced.trust, strict=True):

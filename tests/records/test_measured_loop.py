@@ -33,6 +33,16 @@ def noisy(seed, *, noise=1e-4, torque_noise=0.005, drift=0.0, knots=(0, 1, -1, 1
     return loop(torque + torque_noise * generator.normal(size=len(time)), angle, time)
 
 
+def test_a_gap_over_the_steep_part_is_an_error_of_the_area():
+    """Between the ends of a gap the path may take either corner."""
+    time, torque = ramps((0, 1, -1, 1), hertz=500)
+    angle = play(torque)
+    kept = ~((torque > -0.6) & (torque < 0.2) & (time > 3.0))
+    found, whole = loop(torque[kept], angle[kept], time[kept]), loop(torque, angle, time)
+    assert abs(found.loop_area_j - TRUTH[0]) > 20 * whole.loop_area_j_sd
+    assert abs(found.loop_area_j - TRUTH[0]) < 3 * found.loop_area_j_sd
+
+
 def test_without_noise_the_truth_comes_out():
     found = noisy(0, noise=0.0, torque_noise=0.0, hertz=2000)
     assert (found.basis, found.cycles) == ("settled", 1)

@@ -2,10 +2,15 @@
 
 import numpy as np
 import pytest
+from conftest import answer, ramps
+from scipy.ndimage import uniform_filter1d
 from support.planted import planted
 
+from backdrive_bayes.engine.infer import _amplitude
 from backdrive_bayes.engine.reduced import reduce_unit
+from backdrive_bayes.mechanics.history import of_blocks
 from backdrive_bayes.records import reduction
+from backdrive_bayes.records.record import Record, Unit
 
 
 def outer_counts(monkeypatch, hertz, halvings):
@@ -30,3 +35,50 @@ def test_no_block_is_halved_to_less_than_few_samples(monkeypatch):
     halved, _ = outer_counts(monkeypatch, 200.0, 3)
     assert whole.max() > 2 * reduction.FEW
     assert np.all(halved >= np.minimum(whole, reduction.FEW))
+
+
+def turned(torque, time, *, noise=2e-3, seed=0, kept=slice(None)):
+    """A unit with one record of this torque [N·m], read with noise."""
+    rng = np.random.default_rng(seed)
+    angle, read = answer(torque) + 2e-5 * rng.standard_normal(time.size), torque + noise * rng.standard_normal(time.size)
+    return Unit("u", 1.0, (Record("r.csv", time[kept], read[kept], angle[kept], 0.1),))
+
+
+def ramped(dwell=0.0, rounding=1):
+    """Time and torque of a loop of ±1 N·m, the torque at rest at its tips or rounded over so many samples."""
+    time, torque = ramps((0, 1, -1, 1, 0), rate=0.1, hertz=500.0, dwell=dwell)
+    return time, uniform_filter1d(torque, rounding, mode="nearest")
+
+
+@pytest.mark.parametrize("tips", [{}, {"dwell": 0.8}, {"dwell": 0.15}, {"rounding": 201}], ids=str)
+def test_the_amplitude_is_that_of_the_torque_whatever_its_tips(tips):
+    """Straight flanks meet beyond a tip at which the torque rests or turns gradually."""
+    time, torque = ramped(**tips)
+    true = np.abs(torque).max()
+    found = [reduce_unit(turned(torque, time, seed=seed)).blocks[0].amplitude_nm / true - 1.0 for seed in range(4)]
+    assert np.abs(found).max() < 1.5e-3, found
+
+
+def test_without_its_kinks_a_resting_torque_would_be_overshot(monkeypatch):
+    """The planted fault."""
+    monkeypatch.setattr(reduction, "MOST_KINKS", 0)
+    monkeypatch.setattr(reduction, "RADII_PRIOR", np.r_[1.0, np.zeros(reduction.RADII.size - 1)])
+    time, torque = ramped(dwell=0.15)
+    assert reduce_unit(turned(torque, time)).blocks[0].amplitude_nm > 1.003
+
+
+def test_no_block_reaches_over_a_gap():
+    time, torque = ramped()
+    (blocks,) = reduce_unit(turned(torque, time, kept=(time < 21.0) | (time > 23.0))).blocks
+    assert not np.any((blocks.begin_s < 22.0) & (blocks.end_s > 22.0))
+    # What passes in the gap counts in the mean of neither neighbour: the path's means are those of the samples.
+    history = of_blocks(blocks, 1.0)
+    means = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
+    for k in np.flatnonzero(np.abs(blocks.mid_s - 22.0) < 1.3):
+        inside = (time >= blocks.begin_s[k]) & (time <= blocks.end_s[k])
+        assert means[k] == pytest.approx(torque[inside].mean(), abs=2e-3)
+
+
+def test_the_declared_amplitude_is_that_of_the_loop_where_the_torque_reached_it():
+    assert _amplitude(1.01, 1.0) == 1.0 and _amplitude(0.99, 1.0) == 1.0
+    assert _amplitude(1.2, 1.0) == 1.2 and _amplitude(1.01, None) == 1.01
