@@ -117,12 +117,12 @@ class Found:
 
     @cached_property
     def unsupported(self) -> bool:
-        """Whether the name explains too little of held-out data to be one, where others predict these without extrapolating and
-        the gap is wider than the noise: a part of less is mostly that of the class."""
+        """Whether the name explains too little of held-out data to be one: of all of them, and of those that the others predict
+        without extrapolating, where the gap is wider than the noise (a part of less is mostly that of the class)."""
         names = set(self.named) - {p.name for p in self.properties} - {STICK_SLIP, "unknown", *self.withheld}
         folds = within_reach(self.linear)
         closed = self.closed_of(folds) if names and folds else None
-        if closed is None:
+        if closed is None or self.closed is None or self.closed["hi"] >= LEAST_CLOSED:
             return False
         before, floor = (self.held_out.mean_square(part, folds) for part in ("before", "floor"))
         return before > CLEAR_GAP * floor and closed["hi"] < LEAST_CLOSED

@@ -32,6 +32,7 @@ NUMBERS = {
     "alike": f"{reducer.ALIKE:g}",
     "largest_drag": f"{reducer.LARGEST_DRAG:g}",
     "power": f"{infer.POWER:g}",
+    "reached": f"{100 * infer.REACHED:g} %",
     "max_rhat": f"{diagnostics.MAX_RHAT:g}",
     "min_ess": f"{diagnostics.MIN_ESS:g}",
     "ensembles": str(sample.ENSEMBLES),

@@ -140,19 +140,26 @@ def test_the_legs_of_one_record_are_all_within_reach():
 
 
 @pytest.mark.parametrize(
-    ("rates", "before", "hi", "unsupported"),
+    ("rates", "before", "hi", "whole", "unsupported"),
     [
-        ((1.0, 1.0), 9.0, 0.3, True),
-        ((1.0, 1.0), 9.0, 0.6, False),
-        ((1.0, 1.0), 3.0, 0.3, False),
-        ((1.0, 9.0), 9.0, 0.3, False),
+        ((1.0, 1.0), 9.0, 0.3, 0.3, True),
+        ((1.0, 1.0), 9.0, 0.6, 0.3, False),
+        ((1.0, 1.0), 9.0, 0.3, 0.8, False),
+        ((1.0, 1.0), 3.0, 0.3, 0.3, False),
+        ((1.0, 9.0), 9.0, 0.3, 0.3, False),
     ],
-    ids=["a wide gap stays open", "it may be closed", "the gap is narrower than the noise", "no record is within reach"],
+    ids=[
+        "a wide gap stays open",
+        "it may be closed",
+        "most of all that is held out is closed",
+        "the gap is narrower than the noise",
+        "no record is within reach",
+    ],
 )
-def test_a_name_must_close_a_gap_that_is_seen_without_extrapolating(rates, before, hi, unsupported):
+def test_a_name_must_close_a_gap_that_is_seen_without_extrapolating(rates, before, hi, whole, unsupported):
     held = SimpleNamespace(mean_square=lambda part, folds: {"before": before, "floor": 1.0}[part])
     found = SimpleNamespace(named=("torque_offset",), properties=(), withheld={}, linear=run_at(rates, (1.0, 1.0)), held_out=held)
-    found.closed_of = lambda folds: {"hi": hi}
+    found.closed_of, found.closed = lambda folds: {"hi": hi}, {"hi": whole}
     assert examine.Found.unsupported.func(found) is unsupported
 
 
