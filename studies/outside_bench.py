@@ -5,8 +5,8 @@
 
 It imports nothing of the package and stands in one file, so that it can be read and judged apart. A drive is a chain of bodies in
 series; a stage has 3 to 25 tooth pairs, each with its own clearance, Hertzian contact and flank friction; bearings are
-Maxwell-slip or Bouc-Wen elements; shafts harden or soften. Tests have dwells, rounded tips, gaps, unequal sampling, two cycles, any
-start. OUT/key.json holds effects, severity (rms over the angle's noise 20, 6, 2.5) and the clean loop's indicators.
+Maxwell-slip or Bouc-Wen elements; shafts harden or soften. Tests have dwells, rounded tips, gaps, unequal sampling, two cycles,
+any start. OUT/key.json holds effects, severity (rms over the angle's noise 20, 6, 2.5) and the clean loop's indicators.
 
 Inside, torque is in units of the rated torque and angle in units of A0 (half clearance plus wind-up at rated torque).
 """
