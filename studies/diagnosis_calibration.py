@@ -34,9 +34,9 @@ FLOOR = 1e-3
 UNSEEN = """Only the calibration numbers are set on the other benches, in a search that begins at round numbers. Thresholds of
 properties, trace levels, the lowest frequency of a wave and the terms themselves were developed with units of all these
 benches in view: no bench here is wholly unseen."""
-FRESH = """`outside`: `studies/outside_bench.py --units 60 --seed 5`, a bench written without sight of the package. No number of the
-calibration was set on it. Its first run showed that dwells, rounded tips and gaps moved the amplitude and that crowded residuals
-stopped the refinement of knots; both were mended before the run shown here, so it is no longer unseen."""
+FRESH = """`outside`: `studies/outside_bench.py --units 60 --seed 5`, a bench written without sight of the package. No number of
+the calibration was set on it. Its first run showed that dwells, rounded tips and gaps moved the amplitude and that crowded
+residuals stopped the refinement of knots; both were mended before the run shown here, so it is no longer unseen."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 POSITIVE = ("cool", "warm", "spread")
 """Numbers that are searched on a logarithmic scale."""

@@ -67,16 +67,15 @@ def run(args) -> int:
         named = {"limits": args.limits.name, "models": len(others) + 1, "batch": batch_units}
         stamped_by(verdict, [evidence], **named)
         if not made:
+            verdict["posterior_sha256"] = evidence.about["posterior_sha256"]
             refuse_company(out, verdict)
         with write_folder(out) as folder:
             if made:
                 write_json(folder / "diagnosis.json", evidence.diagnosis)
                 posterior, indicators = made
-                digest = keep_fit(posterior, indicators, folder, not args.no_figures, note)
+                verdict["posterior_sha256"] = keep_fit(posterior, indicators, folder, not args.no_figures, note)
                 retire(out, indicators)
-            else:
-                digest = evidence.about["posterior_sha256"]
-            write_json(folder / "verdict.json", verdict | {"posterior_sha256": digest})
+            write_json(folder / "verdict.json", verdict)
             keep_run(folder, "accept", began)
             if not args.no_figures:
                 draw_figures("verdict.json", folder)

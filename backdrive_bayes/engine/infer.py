@@ -65,7 +65,7 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
         distortion=linear.distortion,
         effects=linear.effects,
         context=reduced.context,
-        records=_facts(reduced),
+        records=record_facts(reduced),
         weights=dict(
             zip(names, np.split(drawn.weights, np.cumsum([g.width for g in linear.design.groups])[:-1], axis=-1), strict=True)
         ),
@@ -82,7 +82,8 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
     )
 
 
-def _facts(reduced: Reduced) -> RecordFacts:
+def record_facts(reduced: Reduced) -> RecordFacts:
+    """Names, loading rates [N·m/s] and amplitudes [N·m] of a unit's records, with their blocks and noise."""
     rate = reduced.context.rate * reduced.torque_scale_nm
     pairs = zip(reduced.blocks, reduced.unit.records, strict=True)
     amplitude = np.array([_amplitude(blocks.amplitude_nm, record.amplitude_nm) for blocks, record in pairs])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backdrive_bayes.engine.infer import record_facts
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.parameters import PARAMETERS, posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
@@ -88,11 +89,10 @@ def _finish(found: Found, progress) -> Diagnosis:
 
 
 def _records(found: Found):
-    reduced = found.linear.reduced
-    rate = reduced.context.rate * reduced.torque_scale_nm
+    facts = record_facts(found.linear.reduced)
     return [
-        {"file": b.name, "loading_rate_Nm_per_s": float(v), "amplitude_Nm": b.amplitude_nm}
-        for b, v in zip(reduced.blocks, rate, strict=True)
+        {"file": name, "loading_rate_Nm_per_s": float(rate), "amplitude_Nm": float(amplitude)}
+        for name, rate, amplitude in zip(facts.names, facts.rate_nm_per_s, facts.amplitude_nm, strict=True)
     ]
 
 

@@ -55,7 +55,8 @@ def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, .
     for record, loop in enumerate(measured):
         if loop is None:
             continue
-        loops = draws.loops(draws.rates[record], draws.amplitudes[record]).late(_lag_nm(draws, record))
+        # At the torque that was reached, which may miss the declared amplitude.
+        loops = draws.loops(draws.rates[record], _reached(draws, record)).late(_lag_nm(draws, record))
         for name, text, unit, function in CHECKED:
             value = getattr(loop, name)
             if value is None:
@@ -66,6 +67,11 @@ def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, .
                 inferred = f"inferred as {lo:.4g} to {hi:.4g} {unit}"
                 found.append(f"{text} of {loop.record} was measured as {value:.4g} {unit}, {inferred}")
     return found
+
+
+def _reached(draws, record) -> float:
+    """Amplitude [N·m] of the loop that was measured."""
+    return draws.posterior.records.blocks[record].amplitude_nm
 
 
 def _lag_nm(draws, record):

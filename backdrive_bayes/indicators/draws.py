@@ -178,13 +178,17 @@ def indicators_of(loops: Loops, areas: dict, lost_motion_torque_nm: float, rated
 def core_indicators(loops: Loops, lost_motion_torque_nm: float) -> dict[str, np.ndarray]:
     """The six indicators of the contract by name, each of shape (draws,).
 
-    The dissipation ratio of a whole loop lies in [0, 1]: a draw that noise carries beyond counts as the bound.
+    The dissipation ratio of a whole loop lies in [0, 1]: a draw that noise carries beyond counts as the bound, one that absorbs
+    nothing as 1.
     """
+    absorbed = ind.absorbed_j(loops)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = ind.dissipation_ratio(loops)
     return {
         "lost_motion_rad": ind.lost_motion_rad(loops, lost_motion_torque_nm),
         "zero_torque_width_rad": ind.zero_torque_width_rad(loops),
         "peak_angle_rad": ind.peak_angle_rad(loops),
         "loop_area_J": ind.loop_area_j(loops),
-        "absorbed_J": ind.absorbed_j(loops),
-        "dissipation_ratio": np.clip(ind.dissipation_ratio(loops), 0.0, 1.0),
+        "absorbed_J": absorbed,
+        "dissipation_ratio": np.clip(np.where(absorbed > 0.0, ratio, 1.0), 0.0, 1.0),
     }

@@ -11,6 +11,7 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.quantities import (
     BRACKETS,
     UNITS,
+    WORDED,
     Quantity,
     canonical,
     is_named,
@@ -104,7 +105,8 @@ def _without_unit(headers, kind) -> str:
 
 def _default_column(headers, kind, where) -> tuple[str, Quantity]:
     found = [h for h in headers if h == DEFAULT_COLUMNS[kind]] or [h for h in headers if _bare(h) == kind]
-    if len(found) == 1 and (found[0] == DEFAULT_COLUMNS[kind] or _has_unit(found[0], kind)):
+    plain = len(found) == 1 and _has_unit(found[0], kind) and not WORDED.match(found[0].strip())
+    if plain or found == [DEFAULT_COLUMNS[kind]]:
         return found[0], parse_quantity(found[0], kind, where)
     guessed = found or _likely(headers, kind)
     advice = f"; say which in {_UNIT_FILE}, under [[record]]: {columns_to_paste(headers)}"
@@ -113,7 +115,7 @@ def _default_column(headers, kind, where) -> tuple[str, Quantity]:
     if not guessed:
         raise BadInput(where, f"a {kind} column '{DEFAULT_COLUMNS[kind]}'", f"columns {_listed(headers)}{advice}")
     if not _has_known_unit(guessed[0], kind):
-        units = f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix or in brackets"
+        units = f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix, in brackets or after 'in'"
         raise BadInput(where, units, f"'{guessed[0]}'{suggestion(split_unit(guessed[0])[1], kind)}{advice}")
     quantity = parse_quantity(guessed[0], kind, where)
     note = f"read '{guessed[0]}' as {kind} in {_SPELLED_OUT.get(quantity.unit, quantity.unit)}"

@@ -27,8 +27,8 @@ UNITS: dict[str, dict[str, float]] = {
     },
 }
 BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
-WORDED = re.compile(r"^(?P<name>\S.*?)(?:\s+in\s+|\s*/\s*|\s*,\s*)(?P<unit>\S+)$")
-"""A unit after "in", a slash or a comma: "Moment in mNm", "M / mNm"."""
+WORDED = re.compile(r"^(?P<name>\S.*?)(?:\s+in\s+|\s+/\s+|\s*,\s+)(?P<unit>\S+(?:\s\S+)?)$")
+"""A unit after "in", a slash between blanks or a comma: "Moment in mNm", "M / N m". A bare slash parts groups from channels."""
 _SPELLED_ALIKE = str.maketrans({"µ": "u", "μ": "u", "′": "'", "’": "'", "″": '"', "”": '"', "º": "°"})
 _NAMES = {
     "time": "time t zeit zeitstempel messzeit timestamp elapsed temps tiempo tempo tijd čas 时间 時間 时刻",
@@ -62,9 +62,8 @@ def parse_quantity(spelling: str, kind: str, where: str) -> Quantity:
     name, unit = split_unit(spelling)
     factor = UNITS[kind].get(canonical(unit)) if unit else None
     if factor is None:
-        raise BadInput(
-            where, f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix or in brackets", f"'{spelling}'{suggestion(unit, kind)}"
-        )
+        known = f"a {kind} unit ({', '.join(UNITS[kind])}) as suffix, in brackets or after 'in'"
+        raise BadInput(where, known, f"'{spelling}'{suggestion(unit, kind)}")
     return Quantity(name, canonical(unit), factor)
 
 

@@ -18,6 +18,8 @@ from backdrive_bayes.records.record import Record
 
 SAME_TIP = 0.05
 """Turning points that differ by less, in shares of the largest torque, are of the same tips."""
+LONG_GAP = 0.25
+"""Gaps longer than this share of a usual block cut blocks."""
 FEW = 6
 """Samples up to which a block's mean is that of its samples: the steps between them are then no part of what was read."""
 MOST_KINKS = 12
@@ -65,8 +67,8 @@ class Blocks:
 
     @property
     def amplitude_nm(self) -> float:
-        """Mean |torque| of the turning points that are about as far out as the farthest [N·m]."""
-        reached = np.abs(self.turning_nm)
+        """Mean |torque| of the turning points that are about as far out as the farthest [N·m]; a record's ends are none."""
+        reached = np.abs(self.turning_nm[1:-1] if self.turning_nm.size > 2 else self.turning_nm)
         return float(reached[reached > (1.0 - SAME_TIP) * reached.max()].mean())
 
     def edges_nm(self) -> np.ndarray:
@@ -89,13 +91,15 @@ def reduce_record(record: Record, segments, noise: NoiseEstimate, blocks_per_seg
     step = float(np.median(np.diff(record.time_s)))
     span = np.ptp(record.torque_nm)
     edges, leg = [], []
-    # No block reaches over a gap: its mean would be of one end or the other.
+    # No block reaches over a gap that is long beside it: its mean would be of one end or the other.
     gaps = gaps_after(record.time_s) + 1
+    missed = record.time_s[gaps] - record.time_s[gaps - 1]
     for k, s in enumerate(segments):
         part = np.ptp(record.torque_nm[s.start : s.stop]) / span
         wanted = int(np.ceil(blocks_per_segment * max(part, 0.1)))
         cut = s.start + _block_edges(record.angle_rad[s.start : s.stop], wanted, noise)
-        cut = np.union1d(cut, gaps[(gaps > s.start) & (gaps < s.stop)])
+        long = missed > LONG_GAP * (record.time_s[s.stop - 1] - record.time_s[s.start]) / wanted
+        cut = np.union1d(cut, gaps[long & (gaps > s.start) & (gaps < s.stop)])
         edges.append(cut[:-1])
         leg += [k] * (cut.size - 1)
     starts = np.concatenate(edges)
@@ -145,6 +149,7 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
     mean = np.add.reduceat(record.torque_nm, starts) / count
     mid = np.add.reduceat(record.time_s, starts) / count
     path, variance, common = np.empty((3, mean.size))
+    torque_sd = max(torque_sd, 1e-6 * float(np.ptp(record.torque_nm)), np.finfo(float).tiny**0.25)
     # Turning points lie between the last sample of one segment and the first of the next.
     inner = [0.5 * (record.time_s[s.start - 1] + record.time_s[s.start]) for s in segments[1:]]
     corner = np.r_[record.time_s[0], inner, record.time_s[-1]]
@@ -157,7 +162,7 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
     for k, s in enumerate(segments):
         own = leg == k
         level = trends[k](mid[own])
-        excess = np.mean(count[own] * (mean[own] - level) ** 2) / max(torque_sd, 1e-300) ** 2 - 1
+        excess = np.mean(count[own] * (mean[own] - level) ** 2) / torque_sd**2 - 1
         # Wiener weight of a block mean against the trend: what varies beyond the sensor's white noise is real torque.
         keep = max(excess, 0.0) / (max(excess, 0.0) + 1.0) if excess > 5 / np.sqrt(own.sum()) else 0.0
         level = level + keep * (mean[own] - level)
@@ -186,7 +191,7 @@ def _rounded(record, segments, trends, corner, torque_sd):
             slope = (trend(tip) - trend(tip + inward * reach)) / reach
             near = np.abs(time - tip) <= reach
             left = torque[near] - trend(time[near])
-            chi2 += [np.sum((left + _lacks(time[near] - tip, slope, r)) ** 2) / max(torque_sd, 1e-300) ** 2 for r in radii]
+            chi2 += [np.sum((left + _lacks(time[near] - tip, slope, r)) ** 2) / torque_sd**2 for r in radii]
             tips.append((k, tip, slope))
     share = RADII_PRIOR * np.exp(-0.5 * (chi2 - chi2.min()))
     share /= share.sum()
@@ -208,17 +213,23 @@ def _trend(time, mean, count, torque_sd, bounds):
     """A line through the block means, one with kinks (dwells, rounded tips), or a cubic spline (a torque that sways): whichever
     the noise asks for.
     """
-    weight = np.sqrt(count) / max(torque_sd, 1e-6 * np.ptp(mean) + 1e-300)
+    weight = np.sqrt(count) / torque_sd
     best, best_score = None, np.inf
     for spline in _splines(time, mean, weight, bounds):
-        score = np.sum((weight * (mean - spline(time))) ** 2) + (spline.c.size + spline.t.size) * np.log(time.size)
+        # Kinks have a place each, even knots do not.
+        chosen = spline.t.size - 4 if spline.k == 1 else 0
+        score = np.sum((weight * (mean - spline(time))) ** 2) + (spline.c.size + chosen) * np.log(time.size)
         if score < best_score - CLEARLY:
             best, best_score = spline, score
     return best if best is not None else (lambda t: np.interp(t, time, mean))
 
 
 def _splines(time, mean, weight, bounds):
-    """Lines with no kink, one, two, … each put where the last one leaves most, and cubic splines of even pieces."""
+    """Cubic splines of even pieces, and lines with no kink, one, two, … each put where the last one leaves most."""
+    for pieces in (8, 32):
+        if time.size >= 3 * (pieces + 3):
+            inner = np.quantile(time, np.linspace(0, 1, pieces + 1))[1:-1]
+            yield make_lsq_spline(time, mean, np.r_[[bounds[0]] * 4, inner, [bounds[1]] * 4], 3, w=weight)
     kinks: list[float] = []
     while time.size >= 3 * (len(kinks) + 2) and len(kinks) <= MOST_KINKS:
         inner = np.sort(kinks)
@@ -228,10 +239,6 @@ def _splines(time, mean, weight, bounds):
         if np.sum(left**2) < time.size:
             return
         kinks.append(_kink(time, left, weight, np.r_[bounds[0], inner, bounds[1]]))
-    for pieces in (8, 32):
-        if time.size >= 3 * (pieces + 3):
-            inner = np.quantile(time, np.linspace(0, 1, pieces + 1))[1:-1]
-            yield make_lsq_spline(time, mean, np.r_[[bounds[0]] * 4, inner, [bounds[1]] * 4], 3, w=weight)
 
 
 def _kink(time, left, weight, knots) -> float:

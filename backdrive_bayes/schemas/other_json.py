@@ -20,7 +20,7 @@ class History(Struct):
 class PredictionFile(Result, kw_only=True):
     """prediction.json, beside prediction.csv: what it rests on.
 
-    ``notes`` say what was guessed or mended in the history, ``caveat`` how far its loading rate is from those measured.
+    ``notes`` say what was guessed or mended in the history, ``caveat`` how far its rate and torque are from those measured.
     """
 
     schema: Literal["backdrive-bayes/prediction/1"]

@@ -57,6 +57,17 @@ def test_structure_speaks_through_the_exit_code(fits, tmp_path):
     assert [m["probability"] for m in found["structure"]["models"]] == [pytest.approx(0.6), pytest.approx(0.4)]
 
 
+def test_a_verdict_belongs_to_its_posterior(tmp_path, capsys):
+    """The verdict of one fit does not come to lie beside another of the same data."""
+    one, other = (write_evidence(tmp_path / name, name="a", seed=seed) for name, seed in (("one", 0), ("other", 1)))
+    good = area(tmp_path, 1.1)
+    assert main(["accept", str(one), "--limits", good, "-o", str(other), "--no-figures"]) == 2
+    assert "the posterior with SHA-256" in capsys.readouterr().err and not (other / "verdict.json").exists()
+    assert main(["accept", str(one), "--limits", good, "--no-figures"]) == 0
+    verdict, fit = (json.loads((one / f"{name}.json").read_text()) for name in ("verdict", "indicators"))
+    assert verdict["posterior_sha256"] == fit["posterior_sha256"]
+
+
 def test_a_former_fit_keeps_its_verdict_beside_it(tmp_path):
     folder = write_evidence(tmp_path / "fit")
     before = (folder / "posterior.nc").read_bytes()

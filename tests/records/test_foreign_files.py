@@ -104,7 +104,7 @@ def test_names_without_units_are_not_guessed(tmp_path, header):
 
 
 @pytest.mark.parametrize(
-    "header", ["Zeit in s,Moment in mNm,Winkel in °", "t / s,M / mNm,phi / deg", "Zeit, s;Moment, mNm;Winkel, °"]
+    "header", ["Zeit in s,Moment in mN m,Winkel in °", "t / s,M / mNm,phi / deg", "Zeit, s;Moment, mNm;Winkel, °"]
 )
 def test_units_after_a_word_a_slash_or_a_comma_are_read(tmp_path, header):
     mark = ";" if ";" in header else ","

@@ -3,7 +3,7 @@ import pytest
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.columns import DEFAULT_COLUMNS, find_column
-from backdrive_bayes.records.quantities import UNITS, parse_quantity
+from backdrive_bayes.records.quantities import UNITS, labelled, parse_quantity
 
 
 @pytest.mark.parametrize(
@@ -91,3 +91,10 @@ def test_missing_and_ambiguous_columns_are_refused():
 
 def test_defaults_are_those_of_the_contract():
     assert DEFAULT_COLUMNS == {"time": "time_s", "torque": "torque_Nm", "angle": "angle_arcmin"}
+
+
+def test_a_bare_slash_parts_groups_from_channels_and_leaves_the_unit_of_the_file():
+    assert labelled("Encoder/rev", "deg") == "Encoder/rev [deg]" and labelled("Stats/min", "Nm") == "Stats/min [Nm]"
+    assert labelled("Moment in mNm", "Nm") == "Moment in mNm"
+    with pytest.raises(BadInput):
+        parse_quantity("Time/min", "time", "r.csv")

@@ -59,6 +59,28 @@ def test_the_amplitude_is_that_of_the_torque_whatever_its_tips(tips):
     assert np.abs(found).max() < 1.5e-3, found
 
 
+def test_a_torque_that_sways_is_followed_and_its_amplitude_stays():
+    time, torque = ramped()
+    swaying = torque + 0.004 * np.sin(2 * np.pi * time / 10.0)
+    (blocks,) = reduce_unit(turned(swaying, time)).blocks
+    mid = np.interp(blocks.mid_s, time, uniform_filter1d(swaying, 5))
+    inner = np.abs(np.abs(mid) - 1.0) > 0.05
+    assert np.sqrt(np.mean((blocks.torque_nm - mid)[inner] ** 2)) < 4e-4
+    assert blocks.amplitude_nm == pytest.approx(1.0, abs=2e-3)
+
+
+def test_where_a_record_begins_and_ends_is_no_tip():
+    time, torque = ramps((0.96, -1, 1, -0.96), rate=0.1, hertz=500.0)
+    assert reduce_unit(turned(torque, time)).blocks[0].amplitude_nm == pytest.approx(1.0, abs=1.5e-3)
+
+
+def test_a_record_in_packets_has_no_more_blocks_than_a_whole_one():
+    time, torque = ramped()
+    packets = np.arange(time.size) % 16 < 10
+    whole, cut = (reduce_unit(turned(torque, time, kept=kept)).blocks[0].count.size for kept in (slice(None), packets))
+    assert cut < 1.2 * whole
+
+
 def test_without_its_kinks_a_resting_torque_would_be_overshot(monkeypatch):
     """The planted fault."""
     monkeypatch.setattr(reduction, "MOST_KINKS", 0)
