@@ -46,7 +46,8 @@ HEAD = """# Coverage of credible intervals
 
 Made by `python studies/interval_coverage.py`: share of the intervals that hold the reducer's own loop. Every unit
 counts, whether its sampling is said to have converged or not. Units have several records; the 99 % bounds are those of
-as many independent units.
+as many independent units. `outside` is `studies/outside_bench.py`, written without sight of the package; what its first run
+showed was mended (it held .70 at 90 % then), so that it is no longer unseen.
 """
 
 
