@@ -26,7 +26,7 @@ from scipy.stats import binom, chisquare
 from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.bench.known_truth import BenchNoise, physical_reducer, simulate_unit
-from backdrive_bayes.engine.infer import POWER, prepare
+from backdrive_bayes.engine.infer import POWER, POWERS, prepare
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, find_scales, whiten
@@ -100,8 +100,8 @@ def one_unit(template: Template, seed: int) -> dict:
     truth = template.quantities(log_scale[None], weights[None])
     told = drawn.convergence
     result: dict = {"seed": seed, "converged": bool(told.converged), "evaluations": int(told.evaluations)}
-    for label, power in (("whole", 1.0), ("package", POWER)):
-        own = draw_weights(small, basis, flat, ~scales.free, rng, power)
+    for label, powers in (("whole", (1.0,)), ("package", POWERS)):
+        own = draw_weights(small, basis, flat, ~scales.free, rng, powers)
         found = template.quantities(flat, own)
         result[label] = {n: placed(float(truth[n][0]), v, rng) for n, v in found.items()}
         if label == "whole":
@@ -147,7 +147,7 @@ def page(results, seconds: float) -> str:
         f"Made by `python studies/class_sbc.py`: {n} units ({sum(r['converged'] for r in results)} converged, all counted), "
         f"{seconds / n:.1f} s a unit, {int(np.median([r['evaluations'] for r in results]))} evaluations in the median.", "",
         f"Ranks not uniform (chi-square of tenths, Holm at {REJECTED}), of {count}: whole likelihood {rejected['whole']}, "
-        f"to the power {POWER:g} as the package draws weights {rejected['package']}, "
+        f"to powers about {POWER:.2f} as the package draws weights {rejected['package']}, "
         f"planted fault (draws {NARROW:g} times as wide) {rejected['planted']}.",
         "At a power below 1 more than 90 % are meant to be covered here, where the class is exactly right; "
         "log scales see all of the likelihood.",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.special import gammaincinv
 
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
@@ -20,10 +21,12 @@ from backdrive_bayes.mechanics.registry import BENCH, all_effects
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
-POWER = 0.4
-"""Power of the likelihood from which weights are drawn, scales seeing all of it (a coarsened posterior: Miller and Dunson, JASA
-114, 2019): no reducer is quite of the class. Chosen on the clean units of two benches with an earlier form of the class;
-reports/interval-coverage says how often intervals hold the truth with it now."""
+POWER, POWER_DOF, POWER_LEVELS = 2.0 / 3.0, 4.0, 16
+"""Mean power of the likelihood from which weights are drawn, scales seeing all of it (a coarsened posterior: Miller and Dunson,
+JASA 114, 2019): no reducer is quite of the class, and how far it is from it is not known either. The power is therefore a
+chi-square variable of POWER_DOF degrees of freedom over that number, at POWER_LEVELS equally likely values, which makes Student's
+t of what would be normal. reports/interval-coverage says how often intervals hold the truth."""
+POWERS = tuple(POWER * 2.0 * gammaincinv(POWER_DOF / 2.0, (np.arange(POWER_LEVELS) + 0.5) / POWER_LEVELS) / POWER_DOF)
 
 REACHED = 0.03
 """Share by which the amplitude that was reached may miss the declared one."""
@@ -55,7 +58,7 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
     scales = linear.design.scales(levels(linear, hypothesis))
     start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
     mode, solution = find_scales(linear.data, scales, start)
-    drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWER)
+    drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWERS)
     reduced, names = linear.reduced, linear.design.names
     return Posterior(
         unit_name=reduced.unit.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import emcee
@@ -52,12 +53,12 @@ class _Independence(Move):
 
 
 def sample(
-    data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, note=lambda text: None, power: float = 1.0
+    data: Whitened, scales: Scales, mode: np.ndarray, names, seed: int, note=lambda text: None, powers: Sequence[float] = (1.0,)
 ) -> Draws:
     """Draws of the log scales from their marginal posterior, and of the weights given each.
 
     ``mode`` (scales,) holds the log scales at the mode, fixed ones included; ``names`` are those of the scales.
-    Weights are drawn from the likelihood raised to ``power``; the scales always see all of it.
+    Weights are drawn from the likelihood raised to each of ``powers`` equally often; the scales always see all of it.
     """
     compressed, basis = compress(data, scales, mode)
     free = np.flatnonzero(scales.free)
@@ -70,7 +71,7 @@ def sample(
     log_scale = np.broadcast_to(mode, (*drawn.shape[:2], mode.size)).copy()
     log_scale[..., free] = drawn
     rng, flat = np.random.default_rng([seed, ENSEMBLES]), log_scale.reshape(-1, mode.size)
-    weights = draw_weights(compressed, basis, flat, ~scales.free, rng, power).reshape(*drawn.shape[:2], -1)
+    weights = draw_weights(compressed, basis, flat, ~scales.free, rng, powers).reshape(*drawn.shape[:2], -1)
     acceptance = float(np.mean([s.acceptance_fraction.mean() for s in samplers]))
     return Draws(log_scale, weights, density, acceptance, convergence)
 
@@ -161,14 +162,23 @@ def compress(data: Whitened, scales: Scales, mode: np.ndarray) -> tuple[Whitened
     return Whitened(data.x @ basis.turn, data.y, data.samples, data.noise_dof), basis
 
 
-def draw_weights(data: Whitened, basis: Basis, log_scale, fixed, rng, power: float = 1.0) -> np.ndarray:
+def draw_weights(data: Whitened, basis: Basis, log_scale, fixed, rng, powers: Sequence[float] = (1.0,)) -> np.ndarray:
     """Exact draws (draws, weights) of the weights given log scales (draws, scales), of which those ``fixed`` (scales,) are the
-    same in all draws; the likelihood is raised to ``power``."""
-    by_group = np.exp(np.clip(log_scale, *LOG_SCALES)).T
-    moments, held = data.moments.coarsened(power), fixed[basis.group]
-    known = Known.of(moments, held, by_group[basis.group[held], 0])
+    same in all draws; the likelihood is raised to each of ``powers`` equally often, in random order."""
     # Drawn in the columns' own weights: signs and turns of principal directions must not change what a seed gives.
-    random = rng.standard_normal((basis.turn.shape[0], log_scale.shape[0]))
+    random, level = rng.standard_normal((log_scale.shape[0], basis.turn.shape[0])), np.arange(log_scale.shape[0]) % len(powers)
+    rng.shuffle(level)
+    found = np.empty_like(random)
+    for k, power in enumerate(powers):
+        own = level == k
+        found[own] = _draw_coarsened(data.moments.coarsened(power), basis, log_scale[own], fixed, random[own].T, rng)
+    return found
+
+
+def _draw_coarsened(moments, basis, log_scale, fixed, random, rng) -> np.ndarray:
+    """The same for one power, from standard normal ``random`` (weights, draws)."""
+    by_group, held = np.exp(np.clip(log_scale, *LOG_SCALES)).T, fixed[basis.group]
+    known = Known.of(moments, held, by_group[basis.group[held], 0])
     noise, spread = basis.turn.T @ random, np.empty(log_scale.shape[0])
     free, chance = by_group[basis.group[~held]], rng.chisquare(moments.dof, spread.size)
     # Walkers that stay where they are share their log scales: one factorisation serves all their draws.

@@ -22,13 +22,13 @@ NAMES = ("lost_motion_rad", "loop_area_J", "dissipation_ratio", "peak_angle_rad"
 LEAST, MOST = binom.interval(0.99, UNITS, LEVEL)
 
 
-def fitted(unit: Unit, effects=(), seed=0, power=1.0):
+def fitted(unit: Unit, effects=(), seed=0, powers=(1.0,)):
     """A posterior of few blocks and few steps: log scales are drawn roughly, weights exactly.
 
     At full power: units of the class itself need no coarsened likelihood.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "POWER", power)
+        patch.setattr(module, "POWERS", powers)
         for room, name, value in (
             (sample, "WALKERS", 16),
             (sample, "FIRST_STEPS", 6),
@@ -110,7 +110,7 @@ def test_the_last_bits_of_the_data_move_no_interval():
 
 def test_a_coarsened_posterior_is_wider():
     unit = planted(loops=((0.1, 0.1),))
-    full, third = (ends(fitted(unit, power=p)) for p in (1.0, 1.0 / 3.0))
+    full, third = (ends(fitted(unit, powers=(p,))) for p in (1.0, 1.0 / 3.0))
     assert all(np.diff(third[n])[0] > 1.3 * np.diff(full[n])[0] for n in NAMES)
 
 

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import gamma, norm
+from scipy.stats import gamma, ks_2samp, norm
+from scipy.stats import t as student
 
 from backdrive_bayes.engine import proposal as proposal_module
 from backdrive_bayes.engine import sample as engine
+from backdrive_bayes.engine.infer import POWER, POWER_DOF, POWERS
 from backdrive_bayes.engine.marginal import Moments, Scales, Whitened, find_scales
 from backdrive_bayes.engine.proposal import Proposal
 from backdrive_bayes.engine.sample import compress, draw_weights, sample
@@ -154,6 +156,29 @@ def test_unseen_directions_keep_their_prior(fixed):
     np.testing.assert_allclose(np.cov(weights.T), expected, atol=0.05 * np.diag(expected).max())
     np.testing.assert_allclose(weights.mean(axis=0), solution.mean, atol=0.02)
     assert np.std(weights[:, -1]) == pytest.approx(np.exp(-1.0) * np.sqrt(solution.variance * dof / (dof - 2)), rel=0.03)
+
+
+def test_powers_of_the_likelihood_mix_and_make_longer_tails():
+    """Draws at several powers are those of each alone, equally often; the package's own have the tails of Student's t where the
+    data say all, and one power alone (planted fault) has not."""
+    data, scales = problem()
+    data = replace(data, noise_dof=3000.0)
+    wide, fixed = Scales(scales.group, scales.mean + 6.0, scales.sd), np.ones(scales.mean.size, bool)
+    small, basis = compress(data, wide, wide.mean)
+
+    def drawn(powers, draws=40_000):
+        return draw_weights(small, basis, np.tile(wide.mean, (draws, 1)), fixed, np.random.default_rng(1), powers)[:, 0]
+
+    both, alone = drawn((0.2, 1.0)), np.concatenate([drawn((p,), 20_000) for p in (0.2, 1.0)])
+    assert ks_2samp(both, alone).pvalue > 0.01
+    assert ks_2samp(both, drawn((1.0,))).pvalue < 1e-6, "one of the powers alone is another distribution"
+    solution = data.solve(np.exp(wide.mean)[wide.group])
+    deviations = (drawn(POWERS) - solution.mean[0]) / (np.linalg.norm(solution.root[0]) * np.sqrt(solution.variance))
+    inside = (0.5, 0.8, 0.95, 0.99)
+    law = [student.ppf(0.5 + p / 2, POWER_DOF) / np.sqrt(POWER) for p in inside]
+    np.testing.assert_allclose(np.quantile(np.abs(deviations), inside), law, rtol=0.1)
+    normal = np.quantile(np.abs(drawn((POWER,)) - solution.mean[0]), inside)
+    assert normal[-1] / normal[0] < 0.8 * law[-1] / law[0]
 
 
 def test_signs_and_turns_of_principal_directions_change_no_draw():
