@@ -134,7 +134,7 @@ def effect_groups(linear: Linear) -> tuple[Group, ...]:
 
 
 def _class_names(linear):
-    return {p.name for p in linear.reducer.parts} | {"initial", "floating"}
+    return {p.name for p in linear.reducer.parts}
 
 
 def averaged(log_marginals) -> float:

@@ -23,15 +23,10 @@ from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.history import History, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
-INITIAL_LOG_SCALE = (float(np.log(0.02)), 1.5)
 STEP = 2e-5
 """Step of the difference quotients by offset and lag."""
 LEAST_LAW = 0.05
 """Range of a term of the rate's law, over the records, below which nothing is known of it."""
-PER_RECORD = ("initial", "floating")
-"""Groups of the class of which each record has weights of its own."""
-FLOATING_LOG_SCALE = (float(np.log(0.8)), 0.0)
-"""A floating clearance lies anywhere between its flanks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,30 +99,25 @@ def histories(reduced: Reduced, distortion: Distortion) -> list[History]:
     return [_history(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
 
 
-def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, clearance_weights=None) -> Design:
+def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion) -> Design:
     """Columns of the class at a distortion."""
     found: dict[str, list] = {}
     for r, history in enumerate(histories(reduced, distortion)):
         growth = distortion.growth(reduced.context.log_rate[r], reduced.context)
-        columns = reducer.columns(history, growth)
-        columns |= reducer.initial_columns(history, clearance_weights, growth)
-        for name, column in columns.items():
+        for name, column in reducer.columns(history, growth).items():
             found.setdefault(name, []).append(column)
-    return Design(tuple(Group(n, tuple(c), n in PER_RECORD) for n, c in found.items()))
+    return Design(tuple(Group(n, tuple(c)) for n, c in found.items()))
 
 
 def class_prediction(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, weights) -> list[np.ndarray]:
-    """The same times ``weights`` by group, the clearance's own where it floats, without the columns."""
-    found = []
-    for r, history in enumerate(histories(reduced, distortion)):
-        own = {n: np.split(w, len(reduced.blocks))[r] if n in PER_RECORD else w for n, w in weights.items()}
-        found.append(reducer.predict(history, own, distortion.growth(reduced.context.log_rate[r], reduced.context)))
-    return found
+    """The same times ``weights`` by group, without the columns."""
+    rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
+    return [reducer.predict(history, weights, distortion.growth(rate, reduced.context)) for history, rate in rates]
 
 
 def class_priors(reducer: ReducerClass) -> dict[str, tuple[float, float]]:
     """Normal priors of the class's log scales by group."""
-    return {p.name: p.log_scale for p in reducer.parts} | {"initial": INITIAL_LOG_SCALE, "floating": FLOATING_LOG_SCALE}
+    return {p.name: p.log_scale for p in reducer.parts}
 
 
 def path_group(reduced: Reduced, effect: PathEffect) -> Group:

@@ -29,6 +29,7 @@ from backdrive_bayes.mechanics.registry import all_effects
 
 KNOTS, MOST_KNOTS = 60, 140
 """Knots of clearance and free play at first, and refined."""
+MOST_THRESHOLDS, CLOSEST = 46, 0.008
 LEAST_APART = 0.3
 """Least distance of knots in the torque noise of a sample."""
 CONSPICUOUS = 3.5
@@ -146,9 +147,9 @@ class _Search:
                 learnings, jitter = learnings - 1 if found != jitter else 0, found
             covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
             if refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
-                knots = _refined(linear)
-                if knots is not None:
-                    reducer, weights, refined = ReducerClass(knots, self.modules), None, refined + 1
+                knots, thresholds = _refined(linear)
+                if knots.size + thresholds.size > reducer.knots.size + reducer.thresholds.size:
+                    reducer, weights, refined = ReducerClass(knots, self.modules, thresholds), None, refined + 1
                     distortion = _towards(distortion, moved, context)
                     continue
             if still and step >= 2 and not learnings:
@@ -158,14 +159,13 @@ class _Search:
 
     def _knots(self, distortion):
         torques, context = [], self.reduced.context
-        for r, (history, blocks) in enumerate(zip(histories(self.reduced, distortion), self.reduced.blocks, strict=True)):
+        for r, (history, trust) in enumerate(zip(histories(self.reduced, distortion), self.reduced.trust, strict=True)):
             middle = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
-            settled = blocks.leg > 0 if blocks.direction.size > 1 else blocks.leg >= 0
-            torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
+            torques.append(middle[trust > 0] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
     def _linear(self, reducer, distortion, weights, covariances, known, jitter, idle):
-        core = class_groups(self.reduced, reducer, distortion, weights.get("clearance"))
+        core = class_groups(self.reduced, reducer, distortion)
         tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
         design = core.joined(*self.fixed, *tangents)
         shift = _shift(design, distortion, self.effects, self.reduced.context)
@@ -252,21 +252,26 @@ def _apart(starts, context):
     return kept
 
 
-def _refined(linear) -> np.ndarray | None:
-    """Knots with those intervals split in four in which settled blocks leave a conspicuous residual, the worst first until there
-    are MOST_KNOTS; None if nothing is gained.
+def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
+    """Knots, and thresholds of friction, with more of both where settled blocks leave a conspicuous residual, the worst first
+    until there are MOST_KNOTS and MOST_THRESHOLDS: a step is crossed at a torque, a slip begins at a distance from the last
+    turning point.
     """
-    reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
-    for blocks, white in zip(reduced.blocks, linear.residuals(), strict=True):
-        low, high = np.abs(blocks.edges_nm()) / reduced.torque_scale_nm
-        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & (blocks.leg > 0)).tolist():
+    reduced, wanted = linear.reduced, []
+    knots, thresholds = linear.reducer.knots, linear.reducer.thresholds
+    for blocks, white, trust in zip(reduced.blocks, linear.residuals(), reduced.trust, strict=True):
+        low, high = blocks.edges_nm() / reduced.torque_scale_nm
+        turn = blocks.turning_nm[blocks.leg] / reduced.torque_scale_nm
+        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & (trust > 0)).tolist():
             about = range(max(i - 1, 0), min(i + 2, white.size))
-            wanted.append((abs(white[i]), np.concatenate([np.linspace(low[j], high[j], 5) for j in about])))
-    wanted.sort(key=lambda pair: -pair[0])
-    least, found = 0.8 * LEAST_APART * reduced.context.torque_noise, knots
-    for _, more in wanted:
-        inner = np.unique(np.r_[found[:-1], more])
+            torques = np.concatenate([np.linspace(low[j], high[j], 5) for j in about])
+            wanted.append((abs(white[i]), torques, 0.5 * np.abs(torques - turn[i])))
+    wanted.sort(key=lambda found: -found[0])
+    least = 0.8 * LEAST_APART * reduced.context.torque_noise
+    for _, torques, slips in wanted:
+        inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
         finer = spaced(np.r_[inner[inner < TOP], TOP], least)
-        if finer.size <= MOST_KNOTS:
-            found = finer
-    return found if found.size > knots.size else None
+        knots = finer if finer.size <= MOST_KNOTS else knots
+        denser = spaced(np.unique(np.r_[thresholds, slips[(slips > thresholds[0]) & (slips < thresholds[-1])]]), CLOSEST)
+        thresholds = denser if denser.size <= MOST_THRESHOLDS else thresholds
+    return knots, thresholds

@@ -54,12 +54,10 @@ def _departures(posterior: Posterior, record: int) -> np.ndarray:
     history = of_blocks(blocks, context.torque_scale_nm, distortion.offset, distortion.lag_s)
     shared = (history, distortion.growth(context.log_rate[record], context))
     columns = posterior.reducer.columns(*shared)
-    mean = posterior.flat["clearance"].mean(axis=0) if "clearance" in posterior.flat else None
-    columns |= posterior.reducer.initial_columns(history, mean, *shared[1:])
     for effect in posterior.effects:
         if isinstance(effect, PathEffect) and effect.name in posterior.flat:
             columns[effect.name] = history.mean(*effect.responses(history, record, context))
-    per_record = {"initial", "floating", *(e.name for e in posterior.effects if e.per_record)}
+    per_record = {e.name for e in posterior.effects if e.per_record}
     found = np.zeros(())
     for name, column in columns.items():
         weights = posterior.flat.get(name, np.zeros((1, 0)))

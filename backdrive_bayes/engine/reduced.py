@@ -13,12 +13,10 @@ from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.lines import clearest_line
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
-from backdrive_bayes.records.reduction import Blocks, reduce_record
+from backdrive_bayes.records.reduction import AT_TIP, Blocks, reduce_record
 
 MOST_BLOCKS = 1200
 """Blocks of all records together beyond which each record gets fewer."""
-UNSETTLED = 0.01
-"""Power of the likelihood before a record's first reversal, where the unknown initial state decides what is crossed when."""
 UNREAD = 0.15
 UNREAD_LENGTH = 0.1
 """Torque that acts on the reducer and is not read (ripple, cables), in the torque noise of a sample, and the torque, in shares of
@@ -63,12 +61,14 @@ class BlockMeans:
 
     @cached_property
     def trust(self) -> tuple[np.ndarray, ...]:
-        """Power of the likelihood at each block, (blocks,) for each record: little until the torque has turned once, unless the
-        record begins near its largest torque or never turns."""
+        """Power of the likelihood at each block, (blocks,) for each record: none before the torque has turned where all earlier
+        turning points are wiped out (Mayergoyz, 1991, ch. 1). That is at the first tip, in a record that stays within the
+        torques of others at the second, if there is one; a single leg is all there is."""
         found = []
         for blocks in self.blocks:
-            rest = blocks.direction.size > 1 and abs(blocks.turning_nm[0]) < 0.9 * np.abs(blocks.turning_nm).max()
-            found.append(np.where((blocks.leg == 0) & rest, UNSETTLED, 1.0))
+            small = np.abs(blocks.turning_nm).max() < AT_TIP * self.torque_scale_nm and blocks.direction.size > 2
+            unsettled = 0 if blocks.begins_at_tip or blocks.direction.size == 1 else 2 if small else 1
+            found.append((blocks.leg >= unsettled).astype(float))
         return tuple(found)
 
     @cached_property

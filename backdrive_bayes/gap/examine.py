@@ -47,9 +47,7 @@ def _withheld(linear: Linear, baseline) -> dict[str, float]:
     found = {}
     for module in BASELINE:
         if module not in baseline:
-            names = {p.name for p in linear.reducer.parts if p.module == module} | (
-                {"floating"} if module == "geometric" else {"initial"}
-            )
+            names = {p.name for p in linear.reducer.parts if p.module == module}
             scale = np.exp([linear.log_scale[n] for n in linear.design.names])
             without = np.where(np.isin(linear.design.names, list(names)), 1e-6, scale)
             gain = linear.data.log_marginal(scale[linear.design.index]) - linear.data.log_marginal(without[linear.design.index])

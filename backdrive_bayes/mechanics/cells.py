@@ -63,19 +63,19 @@ class Cells:
         scale = np.where(clearance & (self.up + self.width <= CROSSED), factor, 1.0)
         return Cells(scale * self.up + shift, scale * self.down - shift, scale * self.width, scale * self.norm)
 
-    def means(self, history: History, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
+    def means(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
         that differ)."""
-        return self._paired(_means(*_segments(history), *self._relays(history.start, state)), sign)
+        return self._paired(_means(*_segments(history), *self._relays(history.start, history.state)), sign)
 
-    def ends(self, history: History, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
+    def ends(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Responses at the end of every segment, shape (segments, cells)."""
-        return self._paired(_ends(history.z1, *self._relays(history.start, state)), sign)
+        return self._paired(_ends(history.z1, *self._relays(history.start, history.state)), sign)
 
-    def summed(self, history: History, weights, state: str = "neutral", sign: float = 1.0) -> np.ndarray:
+    def summed(self, history: History, weights, sign: float = 1.0) -> np.ndarray:
         """Block means times ``weights`` (cells,), (blocks,)."""
         share = np.concatenate([weights / self.norm, sign * weights / self.norm])
-        arguments = *_segments(history), *self._relays(history.start, state), share
+        arguments = *_segments(history), *self._relays(history.start, history.state), share
         return _summed(*arguments) - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
 
     @cached_property

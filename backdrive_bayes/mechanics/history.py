@@ -19,7 +19,8 @@ class History:
 
     ``z0`` and ``z1`` are the torques at the ends as shares of the unit's largest torque, ``t0`` and ``t1`` the times
     [s], ``block``
-    the block that a segment belongs to and ``weight`` its share of the block's time.
+    the block that a segment belongs to and ``weight`` its share of the block's time. ``state`` is the one of
+    :data:`backdrive_bayes.mechanics.cells.START` in which it begins.
     """
 
     z0: np.ndarray
@@ -29,6 +30,7 @@ class History:
     block: np.ndarray
     weight: np.ndarray
     blocks: int
+    state: str = "neutral"
 
     @property
     def start(self) -> float:
@@ -67,7 +69,9 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     owner, weight = np.r_[owner, who], np.r_[weight, 1.0 / blocks.count[who]]
     order = np.lexsort((t0, t1))
     z0, z1 = (np.interp(t[order], time[along], torque[along]) / torque_scale_nm + offset for t in (t0, t1))
-    return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size)
+    # A tip is reached from the other side.
+    state = "neutral" if not blocks.begins_at_tip else "lower" if blocks.turning_nm[0] > 0 else "upper"
+    return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size, state)
 
 
 def _samples(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:

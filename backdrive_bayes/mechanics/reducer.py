@@ -17,17 +17,15 @@ from backdrive_bayes.mechanics.history import History
 
 TOP = 1.2
 """Torque up to which cells reach, in the unit's largest: an offset of the torque channel must not leave the class."""
-THRESHOLDS = np.geomspace(0.003, 0.92, 18)
-"""Thresholds of friction; a denser grid changes log marginal likelihoods by about 1."""
+THRESHOLDS = np.r_[np.geomspace(0.003, 0.12, 10), np.arange(0.16, 0.94, 0.05)]
+"""Thresholds of friction at first; a bearing that slips at one torque bends the loop at one distance from its tips."""
+USUAL_RATIO = 0.337  # XXX
+SHARED_FRICTION = 0.97
 READ_OUTS = (0.0, 0.04, 0.12, 0.28, 0.5, 0.75, 0.9, 1.0)
 """Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
-INITIAL_THRESHOLDS = (0.01, 0.04, 0.12, 0.3, 0.6)
-"""Thresholds at which a record's friction may have been left anywhere."""
 GROWTH_STEP = 2e-3
 """Step of the difference quotients by the growth of thresholds."""
-ZONES = 12
-"""Groups of clearance relays whose first state is free in each record."""
 LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
 """Torques about which thresholds of friction, and drags of clearance and free play, cease to be usual."""
 SHARED, ALIKE = 0.97, 0.15
@@ -64,17 +62,18 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ReducerClass:
-    """Parts of the class with clearance knots ``knots`` (rising from 0 to TOP)."""
+    """Parts of the class with clearance knots ``knots`` (rising from 0 to TOP) and rising ``thresholds`` of friction."""
 
     knots: np.ndarray
     modules: tuple[str, ...] = BASELINE
+    thresholds: np.ndarray = field(default_factory=lambda: THRESHOLDS)
     parts: tuple[Part, ...] = field(init=False)
 
     def __post_init__(self):
         unknown = [m for m in self.modules if m not in BASELINE]
         if unknown or "elastic" not in self.modules:
             raise BadInput("--baseline", f"modules out of {', '.join(BASELINE)}, elastic among them", ",".join(self.modules))
-        made = (_elastic(), _friction(), _clearance(self.knots), _free_play(self.knots))
+        made = (_elastic(), _friction(self.thresholds), _clearance(self.knots), _free_play(self.knots))
         object.__setattr__(self, "parts", tuple(p for p in made if p.module in self.modules))
 
     def part(self, name: str) -> Part:
@@ -116,40 +115,8 @@ class ReducerClass:
         return np.stack(list(columns), axis=1)
 
     def predict(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
-        """Block means (blocks,) of the parts and of one record's initial state at independent ``weights`` by name: columns times
-        weights without making the columns."""
-        angle = np.zeros(history.blocks)
-        for part in self.parts:
-            own, cells = part.weights(weights[part.name]), self._cells(part, growth)
-            if part.name == "clearance":
-                moved = np.abs(own) * weights.get("floating", np.zeros(ZONES))[_zones(np.abs(own))]
-                angle, own = angle + cells.summed(history, moved, "upper"), own - moved
-            angle = angle + cells.summed(history, own)
-        if "initial" in weights:
-            plays, (upper, lower) = _initial_plays(), weights["initial"].reshape(2, -1)
-            angle = angle + plays.summed(history, upper, "upper") + plays.summed(history, lower, "lower")
-            angle = angle - plays.summed(history, upper + lower)
-        return angle
-
-    def initial_columns(self, history: History, clearance_weights=None, growth=(0.0, 0.0)):
-        """What a record's unknown initial state adds: columns of friction left up or down, and of clearance zones left up.
-
-        ``clearance_weights`` (cells,) are the present independent weights of the clearance, that a zone's state moves.
-        """
-        found = {}
-        if self.has("friction"):
-            plays = _initial_plays()
-            neutral, upper, lower = (plays.means(history, s) for s in ("neutral", "upper", "lower"))
-            found["initial"] = np.hstack([upper - neutral, lower - neutral])
-        if self.has("clearance"):
-            part = self.part("clearance")
-            cells = self._cells(part, growth)
-            moved = cells.means(history, "upper") - cells.means(history)
-            usual = np.full(cells.count, np.exp(part.log_scale[0]))
-            weights = usual if clearance_weights is None else np.abs(part.weights(clearance_weights))
-            zone = _zones(weights)
-            found["floating"] = np.stack([moved[:, zone == k] @ weights[zone == k] for k in range(ZONES)], axis=1)
-        return found
+        """Block means (blocks,) at independent ``weights`` by part: columns times weights without making the columns."""
+        return sum(self._cells(p, growth).summed(history, p.weights(weights[p.name])) for p in self.parts)
 
     def _cells(self, part, growth):
         own = {"friction": growth[0], "clearance": growth[1]}.get(part.name, 0.0)
@@ -161,17 +128,6 @@ def _response(cells, history, weights, ends, sign=1.0):
     return cells.ends(history, sign=sign) @ weights if ends else cells.summed(history, weights, sign=sign)
 
 
-def _zones(weights) -> np.ndarray:
-    """Zone of each clearance cell, (cells,): each holds as much of the weights."""
-    total = np.cumsum(weights)
-    return np.minimum(ZONES * (total - 0.5 * weights) / max(total[-1], 1e-300), ZONES - 1e-9).astype(int)
-
-
-def _initial_plays() -> Cells:
-    r, one = np.array(INITIAL_THRESHOLDS), np.ones(len(INITIAL_THRESHOLDS))
-    return Cells(r - TOP, -r - TOP, 2 * TOP * one, 2 * one)
-
-
 def _elastic() -> Part:
     nodes = np.r_[ELASTIC_NODES[:-1], TOP]
     cells = Cells(nodes[:-1], nodes[:-1], np.diff(nodes), np.full(nodes.size - 1, 2.0))
@@ -179,16 +135,18 @@ def _elastic() -> Part:
     return Part("elastic", "elastic", cells, np.linalg.cholesky(np.exp(-_apart(centre) / 0.3)), (float(np.log(0.5)), 1.0))
 
 
-def _friction() -> Part:
-    rows = []
-    for r in THRESHOLDS:
+def _friction(thresholds) -> Part:
+    rows, share = [], np.gradient(np.log(thresholds)) / USUAL_RATIO
+    for r, part in zip(thresholds, share, strict=True):
         for low, high in zip(READ_OUTS[:-1], READ_OUTS[1:], strict=True):
             if low + r < 1:
                 high = TOP - r if high + r >= 1 else high
-                rows.append((low + r, low - r, high - low, r, 0.5 * (low + high)))
-    up, down, width, threshold, centre = np.array(rows).T
+                rows.append((low + r, low - r, high - low, r, 0.5 * (low + high), part))
+    up, down, width, threshold, centre, share = np.array(rows).T
     level = _below(threshold, LARGEST_THRESHOLD)
     near = np.exp(-_apart(np.log(threshold)) / 0.7) * (0.5 + 0.5 * np.exp(-_apart(np.sqrt(centre)) / 0.3))
+    one = threshold[:, None] == threshold
+    near = SHARED_FRICTION * np.outer(share, share) * near + (1 - SHARED_FRICTION) * one * np.sqrt(np.outer(share, share)) * near
     mixing = np.linalg.cholesky(np.outer(level, level) * near + 1e-9 * np.eye(up.size))
     return Part("friction", "friction", Cells(up, down, width, np.full(up.size, 2.0)), mixing, (float(np.log(0.1)), 1.5))
 

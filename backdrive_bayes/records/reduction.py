@@ -18,6 +18,8 @@ from backdrive_bayes.records.record import Record
 
 SAME_TIP = 0.05
 """Turning points that differ by less, in shares of the largest torque, are of the same tips."""
+AT_TIP = 0.9
+"""Share of the largest torque from which on a record begins at a tip."""
 LONG_GAP = 0.25
 """Gaps longer than this share of a usual block cut blocks."""
 FEW = 6
@@ -70,6 +72,11 @@ class Blocks:
         """Mean |torque| of the turning points that are about as far out as the farthest [N·m]; a record's ends are none."""
         reached = np.abs(self.turning_nm[1:-1] if self.turning_nm.size > 2 else self.turning_nm)
         return float(reached[reached > (1.0 - SAME_TIP) * reached.max()].mean())
+
+    @property
+    def begins_at_tip(self) -> bool:
+        """Whether the record begins at a turning point of its own size, which wipes out what was before."""
+        return bool(abs(self.turning_nm[0]) >= AT_TIP * np.abs(self.turning_nm).max())
 
     def edges_nm(self) -> np.ndarray:
         """Torque at the beginning and the end of each block along the path [N·m], shape (2, blocks)."""
