@@ -28,19 +28,26 @@ def channel_covariance(blocks: Blocks, noise: NoiseEstimate) -> np.ndarray:
     The correlated part is the mean of σ² exp(-|t-t'|/t_c) over all pairs of samples of two blocks, as geometric sums; the white
     part falls with the number of samples. A corrected mean carries part of its correction as error.
     """
-    n, span = blocks.count, blocks.end_s - blocks.begin_s
-    # Samples some hundred correlation times apart are independent to the last bit.
-    decay = np.minimum(span / n / noise.correlation_time_s, 500.0)
-    # expm1 keeps the sums accurate for samples much closer than the correlation time.
-    total = np.expm1(-n * decay) / np.expm1(-decay)
-    apart = np.abs(blocks.mid_s[:, None] - blocks.mid_s[None, :]) - 0.5 * (span[:, None] + span[None, :])
-    apart = np.maximum(apart, 0.0) / noise.correlation_time_s + 0.5 * (decay[:, None] + decay[None, :])
-    matrix = np.outer(total / n, total / n) * np.exp(-apart)
-    np.fill_diagonal(matrix, (n + 2 * (n - total) / np.expm1(decay)) / n**2)
-    matrix *= noise.correlated_rad**2
+    matrix = _correlated(blocks, noise.correlated_rad, noise.correlation_time_s)
+    if noise.wander_rad:
+        matrix += _correlated(blocks, noise.wander_rad, noise.wander_time_s)
     white = noise.white_rad**2 / blocks.count
     matrix[np.diag_indices_from(matrix)] += white + (BEND_ERROR * blocks.bend_rad) ** 2
     return matrix
+
+
+def _correlated(blocks: Blocks, sd_rad: float, time_s: float) -> np.ndarray:
+    """Covariance of the block means of an Ornstein-Uhlenbeck process [rad²]."""
+    n, span = blocks.count, blocks.end_s - blocks.begin_s
+    # Samples some hundred correlation times apart are independent to the last bit.
+    decay = np.minimum(span / n / time_s, 500.0)
+    # expm1 keeps the sums accurate for samples much closer than the correlation time.
+    total = np.expm1(-n * decay) / np.expm1(-decay)
+    apart = np.abs(blocks.mid_s[:, None] - blocks.mid_s[None, :]) - 0.5 * (span[:, None] + span[None, :])
+    apart = np.maximum(apart, 0.0) / time_s + 0.5 * (decay[:, None] + decay[None, :])
+    matrix = np.outer(total / n, total / n) * np.exp(-apart)
+    np.fill_diagonal(matrix, (n + 2 * (n - total) / np.expm1(decay)) / n**2)
+    return matrix * sd_rad**2
 
 
 def local_slope(blocks: Blocks, angle_rad, least_nm: float = 0.0) -> np.ndarray:

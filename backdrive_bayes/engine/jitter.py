@@ -23,7 +23,7 @@ def learn_jitter(linear: Linear) -> Jitter:
 
     def height(jitter):
         size = Jitter(jitter.torque * noise, jitter.length)
-        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof, reduced.trust)
+        data = whiten(columns, linear.angles, reduced.covariances(slopes, size), reduced.scale_dof, reduced.settled)
         prior = -0.5 * (np.log(jitter.torque / USUAL_JITTER.torque) / JITTER_LOG_SD) ** 2
         return data.log_marginal(scale) + data.log_volume + prior
 

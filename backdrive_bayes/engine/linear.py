@@ -47,7 +47,7 @@ class Linear:
 
     def whitened(self, design: Design) -> Whitened:
         """The columns of another design and the angles, whitened as the unit's own."""
-        return whiten(design.records(), self.angles, self.covariances, self.data.noise_dof, self.reduced.trust)
+        return whiten(design.records(), self.angles, self.covariances, self.data.noise_dof, self.reduced.settled)
 
     def residuals(self) -> list[np.ndarray]:
         """Whitened residual of each record's blocks."""

@@ -22,6 +22,7 @@ from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.periodic import PRICE, WAVE, clearest_wave, periodic_group
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
+from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.reducer import BASELINE, TOP, ReducerClass, place_knots, spaced
@@ -59,9 +60,10 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     """The joint model's mode, where every effect may act, and modes of what bends the prediction.
 
     The joint mode is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside
-    the clearest wave of what is left there, if that is higher still. Whatever cannot be followed by a straight line from there
-    (an offset, a lag, a law of the rate, a wave) has modes of its own: one where none of them acts, and those of each and of
-    each pair alone. A hypothesis is weighed about the mode where it is likeliest.
+    the clearest wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
+    Whatever cannot be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own:
+    one where none of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode where it is
+    likeliest.
     """
     fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))
     starts = possible_starts(reduced)
@@ -72,12 +74,18 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         begin = max(others, key=lambda start: free.run(start, TRIAL_STEPS).log_marginal) if len(others) > 1 else others[0]
         joint = max(joint, free.run(begin, STEPS, refine=True), key=lambda ended: ended.log_marginal)
     waves: tuple[Group, ...] = ()
-    gain, frequency = clearest_wave(joint)
-    if gain > 0:
+    wandering, gain = learn_wander(joint)
+    found, frequency = clearest_wave(joint)
+    if found > 0:
         wave = periodic_group(joint, frequency)
-        waved = _Search(reduced, effects, modules, (*fixed, wave)).run(joint.distortion, STEPS, refine=True)
-        if waved.log_marginal - PRICE > joint.log_marginal:
-            joint, waves = waved, (wave,)
+        waved = replace(free, fixed=(*fixed, wave)).run(joint.distortion, STEPS, refine=True)
+        beside, more = learn_wander(waved)
+        if waved.log_marginal + more - PRICE > joint.log_marginal + gain:
+            joint, waves, wandering, gain = waved, (wave,), beside, more
+    if gain > 0:
+        reduced = wandering
+        again = _Search(reduced, effects, modules, (*fixed, *waves))
+        joint = again.run(joint.distortion, STEPS, refine=True, jitter=joint.jitter)
     late = max(start.lag_s for start in starts)
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
     bent = _bent(joint, reach)
@@ -159,9 +167,9 @@ class _Search:
 
     def _knots(self, distortion):
         torques, context = [], self.reduced.context
-        for r, (history, trust) in enumerate(zip(histories(self.reduced, distortion), self.reduced.trust, strict=True)):
+        for r, (history, settled) in enumerate(zip(histories(self.reduced, distortion), self.reduced.settled, strict=True)):
             middle = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
-            torques.append(middle[trust > 0] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
+            torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
     def _linear(self, reducer, distortion, weights, covariances, known, jitter, idle):
@@ -185,7 +193,7 @@ class _Search:
             level = effect.present(self.reduced.context) if free else effect.trace(self.reduced.context)
             priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
-        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.trust)
+        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)
         scales = design.scales(priors)
         start = np.array([known.get(name, mean) for name, mean in zip(design.names, scales.mean, strict=True)])
         return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean))
@@ -259,10 +267,10 @@ def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
     """
     reduced, wanted = linear.reduced, []
     knots, thresholds = linear.reducer.knots, linear.reducer.thresholds
-    for blocks, white, trust in zip(reduced.blocks, linear.residuals(), reduced.trust, strict=True):
+    for blocks, white, settled in zip(reduced.blocks, linear.residuals(), reduced.settled, strict=True):
         low, high = blocks.edges_nm() / reduced.torque_scale_nm
         turn = blocks.turning_nm[blocks.leg] / reduced.torque_scale_nm
-        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & (trust > 0)).tolist():
+        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & settled).tolist():
             about = range(max(i - 1, 0), min(i + 2, white.size))
             torques = np.concatenate([np.linspace(low[j], high[j], 5) for j in about])
             wanted.append((abs(white[i]), torques, 0.5 * np.abs(torques - turn[i])))

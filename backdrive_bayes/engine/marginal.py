@@ -236,21 +236,24 @@ def _slopes(moments: Moments, scale, first) -> tuple[np.ndarray, np.ndarray]:
     return share * squares - (count - left), -hessian
 
 
-def whiten(columns, angles, covariances, noise_dof: float, trust=None) -> Whitened:
+def whiten(columns, angles, covariances, noise_dof: float, settled=None) -> Whitened:
     """Whiten records' columns (blocks, weights) and angles (blocks,) and take out each record's offset.
 
-    ``trust`` (blocks,) of each record is the power to which a block's likelihood, given the blocks before it, is raised.
+    Only ``settled`` blocks (blocks,) of each record count, by default all; the rows of others are zero.
     """
-    parts, volume, samples = [], 0.0, -float(len(columns))
-    trust = [np.ones(angle.size) for angle in angles] if trust is None else trust
-    for block, angle, covariance, power in zip(columns, angles, covariances, trust, strict=True):
-        lower = np.linalg.cholesky(covariance)
-        both = solve_triangular(lower, np.column_stack([block, angle, np.ones(angle.size)]), lower=True, check_finite=False)
-        both *= np.sqrt(power)[:, None]
-        samples += float(power.sum())
-        length = np.linalg.norm(both[:, -1])
-        one = both[:, -1] / length
-        volume -= float(power @ np.log(np.diag(lower)) + np.log(length))
-        parts.append(both[:, :-1] - np.outer(one, one @ both[:, :-1]))
-    joined = np.concatenate(parts)
-    return Whitened(joined[:, :-1], joined[:, -1], samples, noise_dof, volume)
+    settled = [np.ones(angle.size, bool) for angle in angles] if settled is None else settled
+    found = [whiten_record(*record) for record in zip(columns, angles, covariances, settled, strict=True)]
+    joined = np.concatenate([rows for rows, _ in found])
+    samples = float(sum(own.sum() for own in settled) - len(found))
+    return Whitened(joined[:, :-1], joined[:, -1], samples, noise_dof, float(sum(volume for _, volume in found)))
+
+
+def whiten_record(columns, angle, covariance, settled) -> tuple[np.ndarray, float]:
+    """Whitened columns and angle of one record, (blocks, weights + 1), and what that adds to the log marginal likelihood."""
+    lower = np.linalg.cholesky(covariance[np.ix_(settled, settled)])
+    both = np.column_stack([columns, angle, np.ones(angle.size)])[settled]
+    both = solve_triangular(lower, both, lower=True, check_finite=False)
+    length = np.linalg.norm(both[:, -1])
+    one, rows = both[:, -1] / length, np.zeros((angle.size, both.shape[1] - 1))
+    rows[settled] = both[:, :-1] - np.outer(one, one @ both[:, :-1])
+    return rows, -float(np.log(np.diag(lower)).sum() + np.log(length))

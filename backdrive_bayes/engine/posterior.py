@@ -35,7 +35,7 @@ class Posterior:
 
     ``weights`` maps groups to arrays (chains, draws, weights) in shares of the angle scale, ``log_scale`` to arrays (chains,
     draws); tangent effects' weights are values of their parameter. ``predicted_rad`` and ``residual`` hold the mode's block means
-    and whitened residuals (times the root of the blocks' trust) by record. ``hypothesis`` names the effects that are present
+    and whitened residuals (zero where the past decides) by record. ``hypothesis`` names the effects that are present
     (None: each at a scale of its own),
     ``jitter`` is standard deviation and correlation length of the crossing torques [N·m], ``doubts`` say what in the measurement
     speaks against it.

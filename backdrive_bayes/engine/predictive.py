@@ -24,14 +24,14 @@ def covariances_rad2(posterior: Posterior) -> list[np.ndarray]:
 
 def block_offsets(posterior: Posterior) -> list[float]:
     """The encoder's offset of each record [rad]: what is left between reading and prediction in the mean, by generalised
-    least squares with as much trust in a block as its likelihood has.
+    least squares over the settled blocks.
     """
-    found, trusts = [], BlockMeans(posterior.records.blocks, posterior.records.noise).trust
-    for blocks, predicted, covariance, trust in zip(
-        posterior.records.blocks, posterior.predicted_rad, covariances_rad2(posterior), trusts, strict=True
+    found, settled = [], BlockMeans(posterior.records.blocks, posterior.records.noise).settled
+    for blocks, predicted, covariance, own in zip(
+        posterior.records.blocks, posterior.predicted_rad, covariances_rad2(posterior), settled, strict=True
     ):
         both = np.column_stack([np.ones(blocks.count.size), blocks.angle_rad - predicted])
-        one, left = (whitener(covariance) @ both * np.sqrt(trust)[:, None]).T
+        one, left = (whitener(covariance[np.ix_(own, own)]) @ both[own]).T
         found.append(float(one @ left / (one @ one)))
     return found
 

@@ -60,15 +60,15 @@ class BlockMeans:
         return tuple(b.angle_rad / self.angle_scale_rad for b in self.blocks)
 
     @cached_property
-    def trust(self) -> tuple[np.ndarray, ...]:
-        """Power of the likelihood at each block, (blocks,) for each record: none before the torque has turned where all earlier
-        turning points are wiped out (Mayergoyz, 1991, ch. 1). That is at the first tip, in a record that stays within the
-        torques of others at the second, if there is one; a single leg is all there is."""
+    def settled(self) -> tuple[np.ndarray, ...]:
+        """Which blocks count, (blocks,) for each record: none before the torque has turned where all earlier turning points are
+        wiped out (Mayergoyz, 1991, ch. 1). That is at the first tip, in a record that stays within the torques of others at
+        the second, if there is one; a single leg is all there is."""
         found = []
         for blocks in self.blocks:
             small = np.abs(blocks.turning_nm).max() < AT_TIP * self.torque_scale_nm and blocks.direction.size > 2
             unsettled = 0 if blocks.begins_at_tip or blocks.direction.size == 1 else 2 if small else 1
-            found.append((blocks.leg >= unsettled).astype(float))
+            found.append(blocks.leg >= unsettled)
         return tuple(found)
 
     @cached_property

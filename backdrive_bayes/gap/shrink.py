@@ -141,8 +141,8 @@ def _folds(linear):
     blocks = linear.reduced.blocks
     if len(sizes) > 1:
         return {b.name: np.arange(a, z) for b, a, z in zip(blocks, ends[:-1], ends[1:], strict=True)}
-    legs, trusted = blocks[0].leg, linear.reduced.trust[0] == 1.0
-    settled = np.unique(legs[trusted])
+    legs = blocks[0].leg
+    settled = np.unique(legs[linear.reduced.settled[0]])
     # A fold needs others to be predicted from.
     return {f"leg {k + 1}": np.flatnonzero(legs == k) for k in settled} if settled.size > 1 else {"all": np.arange(legs.size)}
 
@@ -195,7 +195,7 @@ def _alone(design: Design, record: int) -> np.ndarray:
 def _ridge(linear, columns, targets, rows, record, scale, used) -> tuple[np.ndarray, np.ndarray]:
     """Posterior means (used, targets) of the ``used`` weights given some rows of ``targets`` (blocks, targets), offsets by
     record integrated, and a root of their covariance (used, used)."""
-    size, rows = int(used.sum()), rows[np.concatenate(linear.reduced.trust)[rows] == 1.0]
+    size, rows = int(used.sum()), rows[np.concatenate(linear.reduced.settled)[rows]]
     start, blocks, covariances = np.searchsorted(record, np.arange(record.max() + 1)), [], []
     for r in np.unique(record[rows]):
         at = rows[record[rows] == r]
@@ -214,10 +214,10 @@ def _control(fitted, own, record) -> np.ndarray:
     linear, residual = fitted.linear, np.concatenate(fitted.residual)
     torque = np.concatenate([b.torque_nm for b in linear.reduced.blocks]) / linear.reduced.torque_scale_nm
     direction = np.concatenate([b.direction[b.leg] for b in linear.reduced.blocks])
-    trusted = np.concatenate(linear.reduced.trust) == 1.0
-    rest = np.setdiff1d(np.flatnonzero(trusted), own)
+    settled = np.concatenate(linear.reduced.settled)
+    rest = np.setdiff1d(np.flatnonzero(settled), own)
     for r in np.unique(record):
-        residual[record == r] -= residual[(record == r) & trusted].mean()
+        residual[record == r] -= residual[(record == r) & settled].mean()
     near = np.exp(-0.5 * ((torque[own, None] - torque[rest]) / 0.05) ** 2) * (direction[own, None] == direction[rest])
     return near @ residual[rest] / (near.sum(axis=1) + 1.0)
 

@@ -59,8 +59,8 @@ class Split:
     @cached_property
     def weight(self) -> tuple[np.ndarray, ...]:
         """Torque that each block spans [N·m], none before the first reversal."""
-        both = zip(self.linear.reduced.blocks, self.linear.reduced.trust, strict=True)
-        return tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * (trust == 1.0) for b, trust in both)
+        both = zip(self.linear.reduced.blocks, self.linear.reduced.settled, strict=True)
+        return tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * settled for b, settled in both)
 
     @cached_property
     def fits(self) -> tuple[Fitted, Fitted]:

@@ -55,8 +55,8 @@ def estimate_gap(linear: Linear, rng) -> Gap:
         mean.append(columns @ solution.mean[own])
         error.append(columns @ (solution.root[own] @ noise))
     # Before the first reversal the initial state decides, and no effect can be told from it.
-    trusted = zip(linear.reduced.blocks, linear.reduced.trust, strict=True)
-    weight = tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * (trust == 1.0) for b, trust in trusted)
+    both = zip(linear.reduced.blocks, linear.reduced.settled, strict=True)
+    weight = tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * settled for b, settled in both)
     variance = [np.diag(c) for c in linear.covariances]
     floor = sum(w @ v for w, v in zip(weight, variance, strict=True)) / sum(w.sum() for w in weight)
     return Gap(tuple(mean), tuple(error), weight, float(np.sqrt(floor)) * scale)

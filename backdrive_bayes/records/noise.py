@@ -28,8 +28,9 @@ SHORTEST_WINDOW = 16
 class NoiseEstimate:
     """Standard deviations of the noise [rad, N·m], the correlation time [s], and their standard errors.
 
-    ``scale_dof`` is the weight of the estimate in chi-square degrees of freedom: the variance of block means is known to a
-    relative standard error sqrt(2 / scale_dof).
+    ``wander_rad`` and ``wander_time_s`` are those of a slow Ornstein-Uhlenbeck process beside, of which short windows see
+    nothing (:mod:`backdrive_bayes.engine.wander`). ``scale_dof`` is the weight of the estimate in chi-square degrees of freedom:
+    the variance of block means is known to a relative standard error sqrt(2 / scale_dof).
     """
 
     white_rad: float
@@ -41,6 +42,8 @@ class NoiseEstimate:
     correlation_time_s_sd: float
     torque_nm_sd: float
     scale_dof: float
+    wander_rad: float = 0.0
+    wander_time_s: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
