@@ -49,7 +49,7 @@ def find_jumps(linear: Linear, wave: float | None = None) -> Jumps:
 
 def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
     """Residuals of each record that has enough of them."""
-    reduced, found = linear.reduced, []
+    reduced, found, slopes = linear.reduced, [], linear.reduced.slopes(linear.predicted)
     for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
         slope = np.abs(np.gradient(linear.predicted[r], blocks.mid_s))
         wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
@@ -57,6 +57,7 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
         block = np.clip(np.searchsorted(blocks.begin_s, record.time_s, side="right") - 1, 0, blocks.count.size - 1)
         leg, angle = np.where(calm, blocks.leg, -1)[block], np.interp(record.time_s, blocks.mid_s, linear.predicted[r])
         rest = record.angle_rad - angle * reduced.angle_scale_rad
+        rest -= slopes[r][block] * between_blocks(record, blocks, noise.torque_nm)
         if wave is not None:
             rest = without_wave(rest, angle, leg, wave)
         step = float(np.median(np.diff(record.time_s)))
@@ -65,6 +66,14 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
         if series is not None:
             found.append(Teeth(series, width * step * float(reduced.context.rate[r])))
     return found
+
+
+def between_blocks(record, blocks, noise_nm: float) -> np.ndarray:
+    """What the torque does beside the straight path from block to block [N·m], (samples,): a torque that rises in stairs moves
+    the angle in stairs. Of what is mostly the sensor's noise the Wiener share is kept.
+    """
+    beside = record.torque_nm - np.interp(record.time_s, blocks.mid_s, blocks.torque_nm)
+    return beside * max(0.0, 1.0 - noise_nm**2 / max(float(np.mean(beside**2)), 1e-300))
 
 
 def without_wave(rest, angle, leg, frequency: float) -> np.ndarray:

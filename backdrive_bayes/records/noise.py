@@ -139,9 +139,12 @@ def median_periodogram(record: ChannelRecord) -> Spectrum:
     most = longest(record)
     length = int(np.clip(most // WINDOWS_PER_SEGMENT, min(32, most), 2048))
     starts = np.concatenate([np.arange(s.start, s.stop - length + 1, length) for s in record.segments])
-    windows = record.angle_rad[starts.astype(int)[:, None] + np.arange(length)]
+    angle, torque = (values[starts.astype(int)[:, None] + np.arange(length)] for values in (record.angle_rad, record.torque_nm))
     basis = np.linalg.qr(np.vander(np.linspace(-1, 1, length), TREND_DEGREE + 1))[0]
-    windows = windows - (windows @ basis) @ basis.T
+    windows, sway = (values - (values @ basis) @ basis.T for values in (angle, torque))
+    # A torque that rises in stairs moves the angle in stairs, which are no noise.
+    along = np.sum(sway * windows, axis=1) / np.maximum(np.sum(sway**2, axis=1), 1e-300)
+    windows = windows - along[:, None] * sway
     taper = np.hanning(length + 2)[1:-1]
     taper = taper / np.sqrt(np.mean(taper**2))
     power = np.abs(np.fft.rfft(windows * taper, axis=1)) ** 2 / length

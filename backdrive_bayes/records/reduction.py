@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_lsq_spline
+from scipy.interpolate import interp1d, make_lsq_spline
 from scipy.optimize import isotonic_regression
 
 from backdrive_bayes.records.faults import gaps_after
@@ -160,21 +160,18 @@ def _smooth_torque(record, segments, starts, stops, leg, torque_sd):
     # Turning points lie between the last sample of one segment and the first of the next.
     inner = [0.5 * (record.time_s[s.start - 1] + record.time_s[s.start]) for s in segments[1:]]
     corner = np.r_[record.time_s[0], inner, record.time_s[-1]]
-    trends = []
+    trends, keeps = [], []
     for k, s in enumerate(segments):
         own = leg == k
-        trends.append(_trend(mid[own], mean[own], count[own], torque_sd, record.time_s[[s.start, s.stop - 1]]))
+        trend, keep = _trend(mid[own], mean[own], count[own], torque_sd, record.time_s[[s.start, s.stop - 1]])
+        trends.append(trend)
+        keeps.append(keep)
     trends = _rounded(record, segments, trends, corner, torque_sd)
     ends = np.array([trend(corner[k : k + 2]) for k, trend in enumerate(trends)])
     for k, s in enumerate(segments):
         own = leg == k
-        level = trends[k](mid[own])
-        excess = np.mean(count[own] * (mean[own] - level) ** 2) / torque_sd**2 - 1
-        # Wiener weight of a block mean against the trend: what varies beyond the sensor's white noise is real torque.
-        keep = max(excess, 0.0) / (max(excess, 0.0) + 1.0) if excess > 5 / np.sqrt(own.sum()) else 0.0
-        level = level + keep * (mean[own] - level)
-        path[own] = isotonic_regression(s.direction * level, weights=count[own]).x * s.direction
-        variance[own] = torque_sd**2 * (keep / count[own] + 2.0 / count[own].sum())
+        path[own] = isotonic_regression(s.direction * trends[k](mid[own]), weights=count[own]).x * s.direction
+        variance[own] = torque_sd**2 * (keeps[k] / count[own] + 2.0 / count[own].sum())
         common[own] = torque_sd**2 / count[own].sum()
     turning = np.r_[ends[0, 0], 0.5 * (ends[:-1, 1] + ends[1:, 0]), ends[-1, 1]]
     for k in range(len(segments)):
@@ -218,7 +215,10 @@ def _lacks(apart, slope, radius):
 
 def _trend(time, mean, count, torque_sd, bounds):
     """A line through the block means, one with kinks (dwells, rounded tips), or a cubic spline (a torque that sways): whichever
-    the noise asks for.
+    the noise asks for; and the weight that the block means themselves have beside it.
+
+    That is the Wiener weight: what varies beyond the sensor's white noise is real torque. The trend then runs straight from
+    block to block and on to the tips.
     """
     weight = np.sqrt(count) / torque_sd
     best, best_score = None, np.inf
@@ -228,7 +228,13 @@ def _trend(time, mean, count, torque_sd, bounds):
         score = np.sum((weight * (mean - spline(time))) ** 2) + (spline.c.size + chosen) * np.log(time.size)
         if score < best_score - CLEARLY:
             best, best_score = spline, score
-    return best if best is not None else (lambda t: np.interp(t, time, mean))
+    level = best(time) if best is not None else mean
+    excess = float(np.mean((weight * (mean - level)) ** 2)) - 1.0
+    if best is not None and excess <= 5 / np.sqrt(time.size):
+        return best, 0.0
+    keep = excess / (excess + 1.0) if best is not None else 1.0
+    nodes = level + keep * (mean - level)
+    return (interp1d(time, nodes, fill_value="extrapolate") if time.size > 1 else lambda t: np.full(np.shape(t), nodes[0])), keep
 
 
 def _splines(time, mean, weight, bounds):

@@ -10,6 +10,7 @@ _MAIN_SHARE = 0.35  # reversals of this share set the length of a typical segmen
 _NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the smoothed noise is noise
 _BLOCKS_PER_SEGMENT = 64
 _LINE_POINTS = 2000  # block means lose nothing of a straight line
+_TOP_SHARE = 0.003  # a turning point lies no further below the top, in shares of the range
 _MEDIAN_BLOCKS = 9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
 
 
@@ -53,7 +54,7 @@ def refine_turning_point(time_s: np.ndarray, torque_nm: np.ndarray, left: int, t
     height = part if top >= 0.5 * (part[0] + part[-1]) else -part
     turn = _highest(height, turn)
     clean, noise = _levelled(height)
-    middle = left + _middle(clean, turn, noise)
+    middle = left + _on_top(clean, _middle(clean, turn, noise), turn, noise)
     start, stop = _flank(clean[: turn + 1], noise)
     end, begin = (len(height) - edge for edge in _flank(clean[turn:][::-1], noise))
     if min(stop - start, end - begin) < 3:
@@ -65,7 +66,20 @@ def refine_turning_point(time_s: np.ndarray, torque_nm: np.ndarray, left: int, t
     if _value(rising, meeting) > _percentile(height[stop - 1 : begin + 1], 90) + 0.1 * np.ptp(height):
         return middle
     index = int(np.searchsorted(time, meeting))
-    return left + (index if time[index] - meeting <= meeting - time[index - 1] else index - 1)
+    index -= int(time[index] - meeting > meeting - time[index - 1])
+    return left + _on_top(clean, index, turn, noise)
+
+
+def _on_top(clean: np.ndarray, index: int, turn: int, noise: float) -> int:
+    """``index`` if the torque is highest there; else, where flanks are bent, the middle of the samples that are."""
+    below = max(_TOP_SHARE * float(np.ptp(clean)), 4.0 * noise)
+    if clean[min(index, len(clean) - 1)] >= clean[turn] - below:
+        return index
+    low = clean < clean[turn] - below
+    first, last = np.flatnonzero(low[:turn]), np.flatnonzero(low[turn:])
+    begin = int(first[-1]) + 1 if first.size else 0
+    end = turn + int(last[0]) if last.size else low.size
+    return (begin + end) // 2
 
 
 def _smoothed(torque: np.ndarray) -> tuple[np.ndarray, int]:
