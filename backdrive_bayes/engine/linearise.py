@@ -31,6 +31,7 @@ from backdrive_bayes.mechanics.registry import all_effects
 KNOTS, MOST_KNOTS = 60, 140
 """Knots of clearance and free play at first, and refined."""
 MOST_THRESHOLDS, CLOSEST = 46, 0.008
+"""Thresholds of friction at most, and the least distance of refined ones."""
 LEAST_APART = 0.3
 """Least distance of knots in the torque noise of a sample."""
 CONSPICUOUS = 3.5
@@ -280,6 +281,7 @@ def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
         inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
         finer = spaced(np.r_[inner[inner < TOP], TOP], least)
         knots = finer if finer.size <= MOST_KNOTS else knots
-        denser = spaced(np.unique(np.r_[thresholds, slips[(slips > thresholds[0]) & (slips < thresholds[-1])]]), CLOSEST)
-        thresholds = denser if denser.size <= MOST_THRESHOLDS else thresholds
+        for slip in slips[(slips > thresholds[0]) & (slips < thresholds[-1])]:
+            if thresholds.size < MOST_THRESHOLDS and np.abs(thresholds - slip).min() >= CLOSEST:
+                thresholds = np.sort(np.r_[thresholds, slip])
     return knots, thresholds

@@ -118,6 +118,7 @@ def _constant(posterior: Posterior) -> dict:
     out["relative_rate"] = (("record",), posterior.context.rate)
     out["duration_s"] = (("record",), posterior.context.duration_s)
     out["knots"] = (("knot",), posterior.reducer.knots)
+    out["thresholds"] = (("threshold",), posterior.reducer.thresholds)
     return out | {name: (("diagnosed",), getattr(found, name)) for name in ("rhat", "bulk_ess", "tail_ess")}
 
 

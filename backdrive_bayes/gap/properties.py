@@ -95,10 +95,14 @@ def steps(z, angle, steeper: bool = True) -> np.ndarray:
 
 
 def slips(branches: Branches) -> np.ndarray:
-    """Angle gained from every onset to full load beyond what the compliance before the onset gives, (draws, onsets)."""
+    """Angle gained from every onset to full load beyond what the branch before the onset gives, (draws, onsets): its compliance
+    there, and if that grows already, its growth (a body softens little by little)."""
     onset = np.array(ONSETS)
-    before, there = (_at(branches.z, branches.loading, x) for x in (onset - BEFORE, onset))
-    return branches.loading[:, -1:] - there - (there - before) / BEFORE * (1.0 - onset)
+    early, middle, there = (_at(branches.z, branches.loading, x) for x in (onset - BEFORE, onset - 0.5 * BEFORE, onset))
+    compliance = (there - early) / BEFORE
+    growth = np.maximum((there - 2.0 * middle + early) / (0.5 * BEFORE) ** 2, 0.0)
+    left = 1.0 - onset
+    return branches.loading[:, -1:] - there - compliance * left - 0.5 * growth * left * (left + BEFORE)
 
 
 def unevenness(branches: Branches) -> np.ndarray:

@@ -19,8 +19,8 @@ TOP = 1.2
 """Torque up to which cells reach, in the unit's largest: an offset of the torque channel must not leave the class."""
 THRESHOLDS = np.r_[np.geomspace(0.003, 0.12, 10), np.arange(0.16, 0.94, 0.05)]
 """Thresholds of friction at first; a bearing that slips at one torque bends the loop at one distance from its tips."""
-USUAL_RATIO = 0.337  # XXX
-SHARED_FRICTION = 0.97
+USUAL_RATIO = float(np.log(1.4))
+"""Ratio of neighbouring thresholds for which the prior of friction's weights is meant: closer ones share its variance."""
 READ_OUTS = (0.0, 0.04, 0.12, 0.28, 0.5, 0.75, 0.9, 1.0)
 """Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
@@ -29,8 +29,9 @@ GROWTH_STEP = 2e-3
 LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
 """Torques about which thresholds of friction, and drags of clearance and free play, cease to be usual."""
 SHARED, ALIKE = 0.97, 0.15
-"""Share of the variance of clearance and free play that neighbours have in common, and the correlation's length in shares of all
-knots. These and the largest drag: of what was tried, what made the marginal likelihood of clean units highest on four benches."""
+"""Share of the variance of clearance, free play and friction that neighbours have in common, and the correlation's length in
+shares of all knots. These and the largest drag: of what was tried, what made the marginal likelihood of clean units highest on
+four benches."""
 HALVINGS = 4
 """How often the interval of knots next to zero is halved: the width at zero torque is that of a point, block means are not."""
 BASELINE = ("geometric", "elastic", "friction")
@@ -146,7 +147,8 @@ def _friction(thresholds) -> Part:
     level = _below(threshold, LARGEST_THRESHOLD)
     near = np.exp(-_apart(np.log(threshold)) / 0.7) * (0.5 + 0.5 * np.exp(-_apart(np.sqrt(centre)) / 0.3))
     one = threshold[:, None] == threshold
-    near = SHARED_FRICTION * np.outer(share, share) * near + (1 - SHARED_FRICTION) * one * np.sqrt(np.outer(share, share)) * near
+    # One bearing by itself may slip at any torque.
+    near = SHARED * np.outer(share, share) * near + (1.0 - SHARED) * one * np.sqrt(np.outer(share, share)) * near
     mixing = np.linalg.cholesky(np.outer(level, level) * near + 1e-9 * np.eye(up.size))
     return Part("friction", "friction", Cells(up, down, width, np.full(up.size, 2.0)), mixing, (float(np.log(0.1)), 1.5))
 

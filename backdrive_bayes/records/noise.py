@@ -144,7 +144,8 @@ def median_periodogram(record: ChannelRecord) -> Spectrum:
     windows, sway = (values - (values @ basis) @ basis.T for values in (angle, torque))
     # A torque that rises in stairs moves the angle in stairs, which are no noise.
     along = np.sum(sway * windows, axis=1) / np.maximum(np.sum(sway**2, axis=1), 1e-300)
-    windows = windows - along[:, None] * sway
+    left = length - TREND_DEGREE - 1
+    windows = (windows - along[:, None] * sway) * np.sqrt(left / (left - 1))
     taper = np.hanning(length + 2)[1:-1]
     taper = taper / np.sqrt(np.mean(taper**2))
     power = np.abs(np.fft.rfft(windows * taper, axis=1)) ** 2 / length
