@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
+from backdrive_bayes.records.turning import torque_noise
+
 PRIOR_CORRELATION_TIME_S = 0.03
 PRIOR_LOG_SD = 0.5
 PRIOR_SD = np.array([4.0, 4.0, PRIOR_LOG_SD])
@@ -20,6 +22,8 @@ POLISHING = 4
 """Newton steps after the search, which stops where the likelihood is flat to its eighth digit: its last bits must not matter."""
 WINDOWS_PER_SEGMENT = 16
 TREND_DEGREE = 3
+SWAYS = 2.0
+"""Variance of a torque beside its trend, in that of its noise, from which on it is taken for real."""
 SHORTEST_WINDOW = 16
 """Samples of a ramp from which a spectrum can be made."""
 
@@ -143,9 +147,9 @@ def median_periodogram(record: ChannelRecord) -> Spectrum:
     basis = np.linalg.qr(np.vander(np.linspace(-1, 1, length), TREND_DEGREE + 1))[0]
     windows, sway = (values - (values @ basis) @ basis.T for values in (angle, torque))
     # A torque that rises in stairs moves the angle in stairs, which are no noise.
-    along = np.sum(sway * windows, axis=1) / np.maximum(np.sum(sway**2, axis=1), 1e-300)
-    left = length - TREND_DEGREE - 1
-    windows = (windows - along[:, None] * sway) * np.sqrt(left / (left - 1))
+    size = np.maximum(np.mean(sway**2, axis=1), 1e-300)
+    real = np.maximum(0.0, 1.0 - SWAYS * torque_noise(record.torque_nm) ** 2 / size)
+    windows = windows - (real * np.mean(sway * windows, axis=1) / size)[:, None] * sway
     taper = np.hanning(length + 2)[1:-1]
     taper = taper / np.sqrt(np.mean(taper**2))
     power = np.abs(np.fft.rfft(windows * taper, axis=1)) ** 2 / length

@@ -17,7 +17,7 @@ import numpy as np
 
 import backdrive_bayes.schemas
 from backdrive_bayes.commands.main import VERBS, main
-from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, prediction, reduced, sample, traces
+from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, prediction, sample, traces
 from backdrive_bayes.gap import examine, probabilities, properties, shrink
 from backdrive_bayes.indicators import same_loop
 from backdrive_bayes.indicators.draws import UNITS
@@ -26,7 +26,6 @@ from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records import lines
 
 NUMBERS = {
-    "unsettled": f"{reduced.UNSETTLED:g}",
     "bent": f"{linearise.BENT:g}",
     "shared": f"{reducer.SHARED:g}",
     "alike": f"{reducer.ALIKE:g}",

@@ -1,9 +1,11 @@
 """Teeth that leap ahead are told from noise, from waves, from teeth the other way and from single steps."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from backdrive_bayes.engine.jumps import SEEN, Teeth, even_series, weigh_teeth, without_wave
+from backdrive_bayes.engine.jumps import SEEN, Teeth, between_blocks, even_series, weigh_teeth, without_wave
 from backdrive_bayes.engine.sawtooth import FAR, STRAY, Noise, Series, _holds, fit_noise, tooth_gain
 
 COUNT = 2000
@@ -121,3 +123,24 @@ def test_an_encoders_wave_is_taken_off_with_its_harmonics():
     measured = noise() + wrong
     assert factor(measured * direction) > 20
     assert factor(without_wave(measured, angle, LEG, 12.0) * direction) < 2
+
+
+def stairs(noise_nm=0.0, step=0.05):
+    """A record whose torque rises in stairs, with blocks of eight samples."""
+    time = np.arange(COUNT) * 0.01
+    smooth = np.linspace(0.0, 1.0, COUNT)
+    torque = (np.floor(smooth / step) * step if step else smooth) + noise_nm * np.random.default_rng(4).standard_normal(COUNT)
+    blocks = SimpleNamespace(mid_s=time.reshape(-1, 8).mean(axis=1), torque_nm=smooth.reshape(-1, 8).mean(axis=1))
+    return SimpleNamespace(time_s=time, torque_nm=torque), blocks
+
+
+def test_a_torque_in_stairs_is_no_stick_slip():
+    """What the angle does with the torque between blocks is taken off; left in (planted fault) it is teeth."""
+    record, blocks = stairs(noise_nm=1e-3)
+    angle = 100.0 * (record.torque_nm - np.linspace(0.0, 1.0, COUNT)) + noise()
+    assert factor(angle) > 20
+    assert factor(angle - 100.0 * between_blocks(record, blocks, 1e-3)) < 1.0
+
+
+def test_the_noise_of_a_straight_torque_is_not_taken_for_stairs():
+    assert np.abs(between_blocks(*stairs(noise_nm=1e-3, step=0.0), 1e-3)).max() < 3e-4

@@ -130,21 +130,30 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     worst[0][first] = 9.0
     monkeypatch.setattr(engine, "MOST_KNOTS", clean.reducer.knots.size + 20)
     monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
-    found = engine._refined(clean)
+    found, thresholds = engine._refined(clean)
     low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
     assert clean.reducer.knots.size < found.size <= engine.MOST_KNOTS
     new = np.setdiff1d(found, clean.reducer.knots)
     width = high - low
     assert np.any((new > low - width) & (new < high + width))
+    # The same block slips at half its distance from the last turning point.
+    tip = clean.reduced.blocks[0].turning_nm[1] / clean.reduced.torque_scale_nm
+    slip = 0.5 * abs(clean.reduced.blocks[0].torque_nm[first] / clean.reduced.torque_scale_nm - tip)
+    more = np.setdiff1d(thresholds, clean.reducer.thresholds)
+    assert 0 < more.size <= engine.MOST_THRESHOLDS and np.abs(more - slip).min() < width
 
 
-def test_little_is_trusted_before_the_first_reversal(clean):
-    """A record from rest is trusted from its first turning point on; one that begins at its largest torque throughout."""
-    for blocks, trust in zip(clean.reduced.blocks, clean.reduced.trust, strict=True):
-        assert np.array_equal(trust < 1, blocks.leg == 0)
+def test_nothing_counts_where_the_past_decides(clean):
+    """A record from rest counts from its first turning point on, one that begins at its largest torque throughout, one that stays
+    within the torques of another from its second turning point on."""
+    for blocks, settled in zip(clean.reduced.blocks, clean.reduced.settled, strict=True):
+        assert np.array_equal(settled, blocks.leg > 0)
     first = clean.reduced.blocks[0]
     at_top = replace(first, turning_nm=np.r_[-first.turning_nm[1], first.turning_nm[1:]])
-    assert np.all(replace(clean.reduced, blocks=(at_top,)).trust[0] == 1.0)
+    assert np.all(replace(clean.reduced, blocks=(at_top,)).settled[0])
+    small = replace(first, turning_nm=0.5 * first.turning_nm, torque_nm=0.5 * first.torque_nm)
+    within = replace(clean.reduced, blocks=(first, small), noise=clean.reduced.noise[:1] * 2).settled[1]
+    assert np.array_equal(within, small.leg > 1)
 
 
 def test_compressing_a_unit_changes_no_log_marginal_likelihood(clean):

@@ -1,5 +1,7 @@
 """Cells against brute-force relays, and the symmetries that make the class a class."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -25,8 +27,8 @@ def path(turning, points=40):
     return np.concatenate([turning[:1], *legs])
 
 
-def along(torque, seconds=None):
-    return through(np.arange(len(torque), dtype=float) if seconds is None else seconds, torque, 1.0)
+def along(torque, seconds=None, state="neutral"):
+    return replace(through(np.arange(len(torque), dtype=float) if seconds is None else seconds, torque, 1.0), state=state)
 
 
 def relays(torque, up, down, width, state):
@@ -57,19 +59,19 @@ def slow(cells, torque, state):
 @given(TORQUES, st.sampled_from(START))
 def test_ends_are_those_of_single_relays(turning, state):
     torque = path(np.array(turning))
-    np.testing.assert_allclose(MANY.ends(along(torque), state), slow(MANY, torque, state), atol=4 * 0.4 / RELAYS)
+    np.testing.assert_allclose(MANY.ends(along(torque, state=state)), slow(MANY, torque, state), atol=4 * 0.4 / RELAYS)
 
 
 @settings(max_examples=25, deadline=None)
 @given(TORQUES, st.sampled_from(START))
 def test_block_means_are_the_means_of_fine_samples(turning, state):
     turning = np.array(turning)
-    coarse = through(np.arange(turning.size, dtype=float), turning, 1.0)
+    coarse = along(turning, state=state)
     fine = path(turning, 800)
-    brute = MANY.ends(along(fine), state)
-    before = np.vstack([MANY.ends(along(np.r_[fine[0], fine[0]]), state), brute[:-1]])
+    brute = MANY.ends(along(fine, state=state))
+    before = np.vstack([MANY.ends(along(np.r_[fine[0], fine[0]], state=state)), brute[:-1]])
     means = (0.5 * (before + brute)).reshape(turning.size - 1, 800, -1).mean(axis=1)
-    np.testing.assert_allclose(MANY.means(coarse, state), means, atol=3e-3)
+    np.testing.assert_allclose(MANY.means(coarse), means, atol=3e-3)
 
 
 def test_a_clearance_rests_in_its_middle_whatever_the_first_torque_is():
@@ -100,10 +102,10 @@ def test_blocks_gather_their_segments_by_weight():
 def test_the_response_is_odd_and_its_counterpart_even(turning, state):
     torque = np.array(turning)
     swapped = {"upper": "lower", "lower": "upper", "neutral": "neutral"}[state]
-    here, there = along(torque), along(-torque)
+    here, there = along(torque, state=state), along(-torque, state=swapped)
     for sign in (1.0, -1.0):
         for method in (MANY.means, MANY.ends):
-            np.testing.assert_allclose(method(there, swapped, sign), -sign * method(here, state, sign), atol=1e-12)
+            np.testing.assert_allclose(method(there, sign), -sign * method(here, sign), atol=1e-12)
 
 
 @settings(max_examples=60, deadline=None)
@@ -193,17 +195,7 @@ def test_relays_near_the_tip_keep_their_torques():
 @pytest.mark.parametrize("name", CELLS)
 def test_states_bound_the_neutral_one(name):
     torque = path(np.array([0.0, 0.15, -0.15, 0.1]))
-    lower, neutral, upper = (CELLS[name].means(along(torque), s) for s in ("lower", "neutral", "upper"))
+    lower, neutral, upper = (CELLS[name].means(along(torque, state=s)) for s in ("lower", "neutral", "upper"))
     assert np.all(lower <= neutral + 1e-15) and np.all(neutral <= upper + 1e-15)
     if name == "friction":
         assert np.any(lower < upper - 1e-3), "a free initial state must make a difference"
-
-
-@pytest.mark.parametrize("start", [-0.95, 0.0, 0.2, 0.95])
-def test_a_record_may_begin_with_its_friction_left_up_or_down(start):
-    """No column of the initial state vanishes, wherever the first torque lies, unless that torque itself forces it."""
-    reducer = ReducerClass(np.r_[0.0, np.geomspace(0.01, 1.2, 20)])
-    initial = reducer.initial_columns(along(path(np.array([start, start + 0.01]))))["initial"]
-    upper, lower = np.abs(initial).max(axis=0).reshape(2, -1)
-    assert np.all(np.maximum(upper, lower) > 1e-3)
-    assert np.all((upper > 1e-3) & (lower > 1e-3)) or abs(start) > 0.1

@@ -1,4 +1,6 @@
-"""The class: parts, modules, knots, initial states, and columns that are those of its cells."""
+"""The class: parts, modules, knots, thresholds, and columns that are those of its cells."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,7 +8,7 @@ import pytest
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.cells import Cells
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import BASELINE, INITIAL_THRESHOLDS, TOP, ZONES, ReducerClass, place_knots, spaced
+from backdrive_bayes.mechanics.reducer import BASELINE, THRESHOLDS, TOP, ReducerClass, place_knots, spaced
 
 KNOTS = np.r_[0.0, np.geomspace(0.01, TOP, 20)]
 REDUCER = ReducerClass(KNOTS)
@@ -63,8 +65,6 @@ def test_modules_choose_the_parts(modules):
     reducer = ReducerClass(KNOTS, modules)
     assert {p.module for p in reducer.parts} == set(modules)
     assert set(reducer.columns(ramp(0.0, 1.0))) == {p.name for p in reducer.parts}
-    initial = reducer.initial_columns(ramp(0.0, 1.0))
-    assert ("initial" in initial) == ("friction" in modules) and ("floating" in initial) == ("geometric" in modules)
     assert reducer.has("clearance") == ("geometric" in modules)
 
 
@@ -101,24 +101,37 @@ def test_growth_has_its_own_derivatives(ends):
         assert np.sqrt(np.mean((found[:, k] - wide) ** 2)) < 0.15 * np.abs(wide).max() and np.abs(wide).max() > 0
 
 
-def test_an_initial_state_is_forgotten_once_the_torque_has_been_everywhere():
-    history = ramp(0.0, TOP, -TOP, TOP)
-    for name, columns in REDUCER.initial_columns(history, np.ones(KNOTS.size - 1)).items():
-        assert np.abs(columns[:150]).max() > 0.1, name
-        np.testing.assert_allclose(columns[-190:], 0.0, atol=1e-12)
+def test_denser_thresholds_leave_the_prior_of_the_loop_as_it_is():
+    """Width of the largest loop at zero torque that friction has a priori; with weights as wide as on the first grid more
+    thresholds would make it larger (planted fault)."""
+    history = ramp(0.0, 1.0, -1.0, 1.0)
+    dense = np.sort(np.r_[THRESHOLDS, np.sqrt(THRESHOLDS[1:] * THRESHOLDS[:-1])])
+
+    def width(reducer, part=None):
+        part = part or reducer.part("friction")
+        ends = part.mix(part.cells.ends(history))
+        falling, rising = (199 + int(np.argmin(np.abs(history.z1[leg : leg + 199]))) + leg - 199 for leg in (199, 398))
+        return np.linalg.norm(ends[falling] - ends[rising])
+
+    usual, more = (width(ReducerClass(KNOTS, BASELINE, t)) for t in (THRESHOLDS, dense))
+    assert more == pytest.approx(usual, rel=0.1)
+    part = ReducerClass(KNOTS, BASELINE, dense).part("friction")
+    level = np.sqrt(np.sum(part.mixing**2, axis=1))
+    assert width(None, replace(part, mixing=part.mixing * (level.max() / level)[:, None])) > 1.3 * usual
 
 
-def test_initial_columns_are_those_of_thresholds_and_zones():
-    found = REDUCER.initial_columns(ramp(0.0, 1.0, -1.0))
-    assert found["initial"].shape[1] == 2 * len(INITIAL_THRESHOLDS) and found["floating"].shape[1] == ZONES
-    assert np.isfinite(REDUCER.initial_columns(ramp(0.0, 1.0), np.zeros(KNOTS.size - 1))["floating"]).all()
+def test_a_bearing_that_slips_at_one_torque_is_held_at_every_amplitude_by_its_own_threshold():
+    """One play operator between two thresholds of the first grid, on loops of three amplitudes: what the best weights leave, with
+    and without a threshold of its own."""
+    r = 0.5 * (THRESHOLDS[-4] + THRESHOLDS[-3])
+    history = ramp(0.0, 1.0, -1.0, 0.9, -0.9, 0.97, -0.97)
+    truth = Cells(*(np.array([v]) for v in (r - TOP, -r - TOP, 2 * TOP, 2.0))).ends(history)[:, 0]
 
+    def left(thresholds):
+        columns = np.hstack(list(ReducerClass(KNOTS, BASELINE, thresholds).ends(history).values()))
+        return np.abs(truth - columns @ np.linalg.lstsq(columns, truth, rcond=1e-9)[0]).max()
 
-def test_zones_together_are_all_relays_left_up():
-    history, weights = ramp(0.0, 1.0, -1.0), np.linspace(0.5, 2.0, KNOTS.size - 1)
-    part = REDUCER.part("clearance")
-    moved = (part.cells.means(history, "upper") - part.cells.means(history)) @ np.abs(part.weights(weights))
-    np.testing.assert_allclose(REDUCER.initial_columns(history, weights)["floating"].sum(axis=1), moved, atol=1e-12)
+    assert left(np.sort(np.r_[THRESHOLDS, r])) < 1e-6 < 1e-3 < left(THRESHOLDS)
 
 
 def test_flanks_that_differ_are_even_in_the_torque():

@@ -6,6 +6,7 @@ from conftest import FULL_CYCLE, ramps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from backdrive_bayes.records import turning
 from backdrive_bayes.records.branches import find_branches, find_segments
 from backdrive_bayes.records.clock import strictly_rising
 
@@ -54,6 +55,26 @@ def test_turning_points_and_labels(knots, turns, expected, noise):
 def test_dwell_and_plateau_are_cut_in_the_middle(noise):
     assert starts(*ramps(dwell=0.2, noise=noise)) == pytest.approx([0, 220, 660], abs=3)
     assert starts(*ramps((0, 2, -2, 2), limit=1.2, noise=noise)) == pytest.approx([0, 400, 1200], abs=8)
+
+
+def by_hand(seed=0):
+    """A torque whose speed wavers by a factor of two, with its tips: flanks are bent, tips are sharp."""
+    rng = np.random.default_rng(seed)
+    speed = np.exp(0.5 * np.interp(np.arange(4000), np.linspace(0, 4000, 40), rng.standard_normal(40)))
+    run = 5.0 * np.r_[0.0, np.cumsum(speed[:-1])] / speed[:-1].sum()
+    torque = np.interp(run, [0, 1, 3, 5], [0, 1, -1, 1])
+    return np.arange(4000) * 0.01, torque + 1e-4 * rng.standard_normal(4000), np.searchsorted(run, [1, 3])
+
+
+def test_tips_of_a_torque_by_hand_are_where_it_turns(monkeypatch):
+    for seed in range(5):
+        time, torque, tips = by_hand(seed)
+        assert starts(time, torque)[1:] == pytest.approx(tips.tolist(), abs=20)
+        found = torque[starts(time, torque)[1:]]
+        np.testing.assert_allclose(found, [1, -1], atol=0.006)
+    monkeypatch.setattr(turning, "_TOP_SHARE", 1.0)
+    far = [np.abs(np.abs(by_hand(s)[1][starts(*by_hand(s)[:2])[1:]]) - 1).max() for s in range(5)]
+    assert max(far) > 0.02, "lines through bent flanks alone meet elsewhere (planted fault)"
 
 
 def test_minor_loops_are_segments_but_no_cycles():

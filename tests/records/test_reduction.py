@@ -82,8 +82,9 @@ def test_a_record_in_packets_has_no_more_blocks_than_a_whole_one():
 
 
 def test_without_its_kinks_a_resting_torque_would_be_overshot(monkeypatch):
-    """The planted fault."""
-    monkeypatch.setattr(reduction, "MOST_KINKS", 0)
+    """The planted fault: a straight line and nothing beside it."""
+    straight = lambda time, mean, *_: (np.poly1d(np.polyfit(time, mean, 1)), 0.0)  # noqa: E731
+    monkeypatch.setattr(reduction, "_trend", straight)
     monkeypatch.setattr(reduction, "RADII_PRIOR", np.r_[1.0, np.zeros(reduction.RADII.size - 1)])
     time, torque = ramped(dwell=0.15)
     assert reduce_unit(turned(torque, time)).blocks[0].amplitude_nm > 1.003

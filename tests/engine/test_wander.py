@@ -1,0 +1,44 @@
+"""Slow wander of the reading is found where it is, at about its size and time, and not where it is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise, physical_reducer, simulate_unit
+from backdrive_bayes.engine.design import path_group
+from backdrive_bayes.engine.infer import library_terms
+from backdrive_bayes.engine.linearise import STEPS, _Search
+from backdrive_bayes.engine.reduced import reduce_unit
+from backdrive_bayes.engine.wander import learn_wander
+from backdrive_bayes.mechanics.effect import Distortion, PathEffect
+from backdrive_bayes.mechanics.reducer import BASELINE
+
+SIZE, TIME = 2e-4, 0.1
+"""Of the planted wander: its standard deviation [rad], and its correlation time in shares of a leg."""
+
+
+def learnt(size: float):
+    """The unit of a clean reducer whose reading wanders in each of two records, with what was learnt and the gain."""
+    rng = np.random.default_rng(3)
+    unit, records = simulate_unit(physical_reducer(rng), ((0.1, 0.05), (0.1, 0.1)), BenchNoise(), rng), []
+    for r in unit.records:
+        slow = BenchNoise(0.0, size, TIME * r.time_s[-1] / 2.5, 0.0)
+        records.append(replace(r, angle_rad=r.angle_rad + angle_noise(r.time_s.size, r.time_s[1] - r.time_s[0], slow, rng)))
+    reduced = reduce_unit(replace(unit, records=tuple(records)), 60)
+    fixed = tuple(path_group(reduced, e) for e in library_terms() if isinstance(e, PathEffect))
+    return learn_wander(_Search(reduced, library_terms(), BASELINE, fixed).run(Distortion(), STEPS, refine=True))
+
+
+def test_a_planted_wander_is_learnt_at_its_size_and_time():
+    reduced, gain = learnt(SIZE)
+    assert gain > 20
+    for noise, blocks in zip(reduced.noise, reduced.blocks, strict=True):
+        leg = (blocks.end_s[-1] - blocks.begin_s[0]) / 2.5
+        assert noise.wander_rad == pytest.approx(SIZE, rel=0.7)
+        assert 0.25 * TIME < noise.wander_time_s / leg < 4 * TIME
+
+
+def test_a_reading_that_does_not_wander_has_none():
+    reduced, gain = learnt(0.0)
+    assert gain == 0.0 and all(n.wander_rad == 0.0 for n in reduced.noise)
