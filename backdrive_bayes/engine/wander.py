@@ -11,8 +11,9 @@ from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import whiten_record
 from backdrive_bayes.engine.reduced import Reduced
 
-SIZES = tuple(0.3 * 2.0**k for k in range(9))
-"""Standard deviations that are tried, in those of the noise in a usual block."""
+SIZES = tuple(2.0 ** np.arange(-4, 2))
+"""Standard deviations that are tried, in that of the noise of a sample, about which wanders are usual (half-normal): what moves
+the angle further is no noise."""
 TIMES = tuple(0.5 ** np.arange(7, 0, -1))
 """Correlation times that are tried, in shares of a usual leg's duration."""
 PRICE = float(np.log(len(SIZES) * len(TIMES)))
@@ -33,7 +34,7 @@ def learn_wander(linear: Linear) -> tuple[Reduced, float]:
         rest, settled = sum(inner) - inner[r], reduced.settled[r]
         still = linear.covariances[r] - channel_covariance(blocks, noise[r]) / reduced.angle_scale_rad**2
         plain = channel_covariance(blocks, noise[r])
-        usual = float(np.sqrt(np.median(np.diag(plain))))
+        usual = float(np.hypot(noise[r].white_rad, noise[r].correlated_rad))
         leg = (blocks.end_s[-1] - blocks.begin_s[0]) / blocks.direction.size
 
         def height(i, j, r=r, blocks=blocks, rest=rest, settled=settled, still=still, usual=usual, leg=leg):
@@ -42,7 +43,8 @@ def learn_wander(linear: Linear) -> tuple[Reduced, float]:
             covariance = still + channel_covariance(blocks, own) / reduced.angle_scale_rad**2
             white, volume = whiten_record(columns[r], linear.angles[r], covariance, settled)
             found = replace(data.moments, inner=rest + white.T @ white)
-            return float(found.log_marginal(scale)) + volume, own, white
+            usually = -0.5 * (size / usual) ** 2
+            return float(found.log_marginal(scale)) + volume + usually, own, white
 
         best, now = (-1, 3), height(-1, 3)
         none, tried = now[0], {(-1, 3): now}

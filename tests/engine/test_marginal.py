@@ -200,15 +200,23 @@ def test_a_fixed_scale_stays_where_it_is():
     assert fixed.log_prior(np.array([99.0, -1.0])) == 0.0
 
 
-def test_what_is_trusted_little_counts_as_so_many_fewer_samples(problem):
-    """A record trusted to a tenth weighs as one of ten times the covariance, with a tenth of its samples."""
+def test_blocks_that_do_not_count_are_as_if_they_were_not_there(problem):
+    """Whatever they read, correlated noise included; counted (planted fault) they move the result."""
     columns, angles, covariances = problem
-    trust = [np.full(SIZES[0], 0.1), np.ones(SIZES[1])]
-    data = whiten(columns, angles, covariances, DOF, trust)
-    wide = whiten(columns, angles, [10.0 * covariances[0], covariances[1]], DOF)
-    for ours, theirs in ((data.gram, wide.gram), (data.moment, wide.moment), (data.total, wide.total)):
+    settled = [np.arange(SIZES[0]) >= 3, np.ones(SIZES[1], bool)]
+    wild = [angles[0] + 100.0 * ~settled[0], angles[1]]
+    data, every = whiten(columns, wild, covariances, DOF, settled), whiten(columns, wild, covariances, DOF)
+    own = [np.flatnonzero(s) for s in settled]
+    few = whiten(
+        [c[k] for c, k in zip(columns, own, strict=True)],
+        [a[k] for a, k in zip(angles, own, strict=True)],
+        [c[np.ix_(k, k)] for c, k in zip(covariances, own, strict=True)],
+        DOF,
+    )
+    for ours, theirs in ((data.gram, few.gram), (data.moment, few.moment), (data.total, few.total)):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9)
-    assert data.samples == pytest.approx(0.1 * SIZES[0] + SIZES[1] - 2) and wide.samples == sum(SIZES) - 2
+    assert data.samples == few.samples == sum(SIZES) - 5 and data.log_volume == pytest.approx(few.log_volume)
+    assert np.all(data.x[:3] == 0.0) and abs(every.total / few.total - 1.0) > 0.1
 
 
 def test_a_weight_of_one_sign_halves_its_prior(problem):

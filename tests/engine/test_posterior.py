@@ -5,7 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, norm
+from scipy.stats import t as student
 from support.planted import joint_mode, planted
 
 from backdrive_bayes.bench.known_truth import BenchNoise, random_reducer, simulate_unit
@@ -19,13 +20,15 @@ from backdrive_bayes.records.record import Unit
 
 UNITS, LEVEL, AMPLITUDE, RATE, K = 40, 0.9, 0.1, 0.1, 0.03
 NAMES = ("lost_motion_rad", "loop_area_J", "dissipation_ratio", "peak_angle_rad")
+WIDER = student.ppf(0.95, module.POWER_DOF) / np.sqrt(module.POWER) / norm.ppf(0.95)
+"""Width of 90 % intervals at the package's powers over that at the whole likelihood."""
 LEAST, MOST = binom.interval(0.99, UNITS, LEVEL)
 
 
-def fitted(unit: Unit, effects=(), seed=0, powers=(1.0,)):
-    """A posterior of few blocks and few steps: log scales are drawn roughly, weights exactly.
+def fitted(unit: Unit, effects=(), seed=0, powers=module.POWERS):
+    """A posterior of few blocks and few steps: log scales are drawn roughly, weights exactly, at the package's powers.
 
-    At full power: units of the class itself need no coarsened likelihood.
+    The reducers are of the class, but not drawn from its prior; for those that are see studies/class_sbc.py.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "POWERS", powers)
@@ -74,10 +77,10 @@ def test_intervals_hold_the_truth_as_often_as_they_say(name):
     assert LEAST <= covered(name) <= MOST
 
 
-def test_intervals_of_half_the_width_do_not():
+def test_intervals_of_a_third_of_the_width_do_not():
     """A planted fault: the area and the peak show it at once."""
-    assert min(covered("loop_area_J", 0.5), covered("peak_angle_rad", 0.5)) < LEAST - 3
-    assert sum(covered(n, 0.5) for n in NAMES) < sum(covered(n) for n in NAMES) - 25
+    assert min(covered("loop_area_J", 1 / 3), covered("peak_angle_rad", 1 / 3)) < LEAST - 3
+    assert sum(covered(n, 1 / 3) for n in NAMES) < sum(covered(n) for n in NAMES) - 25
 
 
 def test_intervals_are_narrow():
@@ -85,7 +88,7 @@ def test_intervals_are_narrow():
     before the first reversal."""
     for name, most in (("lost_motion_rad", 0.5), ("loop_area_J", 0.05), ("dissipation_ratio", 0.15), ("peak_angle_rad", 0.1)):
         widths = [np.diff(np.quantile(v, [0.05, 0.95]))[0] / abs(t) for v, t in (u[name] for u in drawn())]
-        assert np.median(widths) < most, (name, np.median(widths))
+        assert np.median(widths) < WIDER * most, (name, np.median(widths))
 
 
 def ends(posterior):
