@@ -60,7 +60,7 @@ def one_unit(folder: Path, truth: dict) -> dict:
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in TRUTH}
     for record in result["records"]:
         rate, amplitude = record["loading_rate_Nm_per_s"], record["amplitude_Nm"]
-        own = next((r for r in truth.get("records", []) if r["file"] == record["file"]), {})
+        own: dict = next((r for r in truth.get("records", []) if r["file"] == record["file"]), {})
         if not own.get("full", True):
             continue
         true = own.get("indicators") or truth["indicators"][min(truth["indicators"], key=lambda r: abs(float(r) - rate))]

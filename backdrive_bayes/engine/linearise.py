@@ -76,8 +76,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         joint = max(joint, free.run(begin, STEPS, refine=True), key=lambda ended: ended.log_marginal)
     waves: tuple[Group, ...] = ()
     wandering, gain = learn_wander(joint)
-    found, frequency = clearest_wave(joint)
-    if found > 0:
+    clear, frequency = clearest_wave(joint)
+    if clear > 0:
         wave = periodic_group(joint, frequency)
         waved = replace(free, fixed=(*fixed, wave)).run(joint.distortion, STEPS, refine=True)
         beside, more = learn_wander(waved)
