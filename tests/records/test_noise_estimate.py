@@ -81,3 +81,23 @@ def test_records_of_one_bench_share_the_angle_noise():
     assert second.torque_nm / first.torque_nm == pytest.approx(5, rel=0.05)
     alone = estimate_noise(records[0].time_s, records[0].torque_nm, records[0].angle_rad, records[0].segments)
     assert first.correlated_rad_sd < alone.correlated_rad_sd
+
+
+def test_an_angle_that_follows_a_torque_in_stairs_is_no_noise():
+    """The torque is moved in stairs of a fifth of the windows' length, the angle with it; without the torque beside (planted
+    fault) the stairs are taken for noise."""
+    record = unit_of(3, rate=0.05).records[0]
+    turned = np.interp(np.arange(record.time_s.size), *_stairs(record.time_s.size))
+    angle = record.angle_rad + 0.2 * (np.interp(turned, np.arange(record.time_s.size), record.torque_nm) - record.torque_nm)
+    moved = np.interp(turned, np.arange(record.time_s.size), record.torque_nm)
+    segments = find_segments(record.time_s, record.torque_nm)
+    with_torque, without = (
+        estimate_noise(record.time_s, torque, angle, segments).correlated_rad for torque in (moved, record.torque_nm)
+    )
+    assert with_torque < 1.5 * KNOWN_NOISE.correlated_rad and without > 2.0 * with_torque
+
+
+def _stairs(samples, step=50):
+    """Sample numbers that rest and leap."""
+    edges = np.arange(0, samples, step)
+    return np.sort(np.r_[edges, edges[1:] - 1]), np.repeat(edges, 2)[: 2 * edges.size - 1]
