@@ -13,7 +13,7 @@ from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.lines import clearest_line
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
-from backdrive_bayes.records.reduction import AT_TIP, Blocks, reduce_record
+from backdrive_bayes.records.reduction import Blocks, reduce_record
 
 MOST_BLOCKS = 1200
 """Blocks of all records together beyond which each record gets fewer."""
@@ -62,13 +62,11 @@ class BlockMeans:
     @cached_property
     def settled(self) -> tuple[np.ndarray, ...]:
         """Which blocks count, (blocks,) for each record: none before the torque has turned where all earlier turning points are
-        wiped out (Mayergoyz, 1991, ch. 1). That is at the first tip, in a record that stays within the torques of others at
-        the second, if there is one; a single leg is all there is."""
+        wiped out (Mayergoyz, 1991, ch. 1). That is at the first tip, beyond which nothing is taken to have been before; a single
+        leg is all there is."""
         found = []
         for blocks in self.blocks:
-            small = np.abs(blocks.turning_nm).max() < AT_TIP * self.torque_scale_nm and blocks.direction.size > 2
-            unsettled = 0 if blocks.begins_at_tip or blocks.direction.size == 1 else 2 if small else 1
-            found.append(blocks.leg >= unsettled)
+            found.append(blocks.leg >= (0 if blocks.begins_at_tip or blocks.direction.size == 1 else 1))
         return tuple(found)
 
     @cached_property
