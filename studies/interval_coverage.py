@@ -48,9 +48,9 @@ Made by `python studies/interval_coverage.py`: share of the intervals that hold 
 counts, whether its sampling is said to have converged or not. Units have several records; the 99 % bounds are those of
 as many independent units. `outside` is `studies/outside_bench.py` and `second-outside` `studies/second_outside_bench.py`, each
 written without sight of the package; what their first runs showed was mended (they held .70 and .86 at 90 % then), so that they
-are no longer unseen. In the second, amplitudes differ from record to record and the truth is that of the rated torque. Its rows
-are of the present class, with its random powers; the others are of the class before, of one power of .4 and with a first leg
-that counted a little.
+are no longer unseen. In the second, amplitudes differ from record to record and the truth is that of the rated torque. The rows
+of both are of the present class, with its random powers; the others are of the class before, of one power of .4 and with a
+first leg that counted a little.
 """
 
 
