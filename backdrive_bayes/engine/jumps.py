@@ -53,7 +53,7 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
     for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
         slope = np.abs(np.gradient(linear.predicted[r], blocks.mid_s))
         wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
-        calm = (wide < STEEP * np.median(slope)) & (reduced.settled[r])
+        calm = (wide < STEEP * np.median(slope)) & reduced.settled[r]
         block = np.clip(np.searchsorted(blocks.begin_s, record.time_s, side="right") - 1, 0, blocks.count.size - 1)
         leg, angle = np.where(calm, blocks.leg, -1)[block], np.interp(record.time_s, blocks.mid_s, linear.predicted[r])
         rest = record.angle_rad - angle * reduced.angle_scale_rad

@@ -85,7 +85,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
             joint, waves, wandering, gain = waved, (wave,), beside, more
     if gain > 0:
         reduced = wandering
-        again = _Search(reduced, effects, modules, (*fixed, *waves))
+        again = replace(free, reduced=reduced, fixed=(*fixed, *waves))
         joint = again.run(joint.distortion, STEPS, refine=True, jitter=joint.jitter)
     late = max(start.lag_s for start in starts)
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))

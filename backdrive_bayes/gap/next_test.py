@@ -20,7 +20,7 @@ def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> di
     """The contract's ``next_test`` for the two hypotheses that are still most probable."""
     drops, linear = {}, pair[0].linear
     for text, (history, rate) in _tests(linear).items():
-        # Before the first reversal the initial state decides, and no test separates what nobody knows.
+        # Before the first tip the past decides, and no test separates what nobody knows.
         curves = [_predict(f, history, rate)[POINTS:] for f in pair]
         apart = curves[0] - curves[1]
         apart = apart - apart.mean()

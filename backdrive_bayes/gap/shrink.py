@@ -2,7 +2,7 @@
 
 Records are held out in turn, or legs where there is one record. Weights are those of the rest; what belongs to the
 held-out record
-alone (its offset, initial state, drift) is fitted to it under its prior, for no other record tells it.
+alone (its offset, drift) is fitted to it under its prior, for no other record tells it.
 """
 
 from __future__ import annotations

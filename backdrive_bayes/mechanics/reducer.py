@@ -19,8 +19,9 @@ TOP = 1.2
 """Torque up to which cells reach, in the unit's largest: an offset of the torque channel must not leave the class."""
 THRESHOLDS = np.r_[np.geomspace(0.003, 0.12, 10), np.arange(0.16, 0.94, 0.05)]
 """Thresholds of friction at first; a bearing that slips at one torque bends the loop at one distance from its tips."""
-USUAL_RATIO = float(np.log(1.4))
-"""Ratio of neighbouring thresholds for which the prior of friction's weights is meant: closer ones share its variance."""
+USUAL_SPACING = float(np.log(1.4))
+"""Distance in ln r of neighbouring thresholds for which the prior of friction's weights is meant: closer ones share its
+variance."""
 READ_OUTS = (0.0, 0.04, 0.12, 0.28, 0.5, 0.75, 0.9, 1.0)
 """Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
@@ -29,9 +30,9 @@ GROWTH_STEP = 2e-3
 LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
 """Torques about which thresholds of friction, and drags of clearance and free play, cease to be usual."""
 SHARED, ALIKE = 0.97, 0.15
-"""Share of the variance of clearance, free play and friction that neighbours have in common, and the correlation's length in
-shares of all knots. These and the largest drag: of what was tried, what made the marginal likelihood of clean units highest on
-four benches."""
+"""Share of the variance of clearance and free play that neighbours have in common, and the correlation's length in shares of all
+knots. These and the largest drag: of what was tried, what made the marginal likelihood of clean units highest on four benches.
+Thresholds of friction have the same share in common."""
 HALVINGS = 4
 """How often the interval of knots next to zero is halved: the width at zero torque is that of a point, block means are not."""
 BASELINE = ("geometric", "elastic", "friction")
@@ -80,10 +81,6 @@ class ReducerClass:
     def part(self, name: str) -> Part:
         """A part by name; its module must not be left out."""
         return next(p for p in self.parts if p.name == name)
-
-    def has(self, name: str) -> bool:
-        """Whether the class holds a part of this name."""
-        return any(p.name == name for p in self.parts)
 
     def columns(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """Block means of every part's columns, (blocks, weights) by name.
@@ -137,7 +134,7 @@ def _elastic() -> Part:
 
 
 def _friction(thresholds) -> Part:
-    rows, share = [], np.gradient(np.log(thresholds)) / USUAL_RATIO
+    rows, share = [], np.gradient(np.log(thresholds)) / USUAL_SPACING
     for r, part in zip(thresholds, share, strict=True):
         for low, high in zip(READ_OUTS[:-1], READ_OUTS[1:], strict=True):
             if low + r < 1:

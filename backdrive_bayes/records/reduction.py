@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import interp1d, make_lsq_spline
+from scipy.interpolate import make_interp_spline, make_lsq_spline
 from scipy.optimize import isotonic_regression
 
 from backdrive_bayes.records.faults import gaps_after
@@ -234,7 +234,7 @@ def _trend(time, mean, count, torque_sd, bounds):
         return best, 0.0
     keep = excess / (excess + 1.0) if best is not None else 1.0
     nodes = level + keep * (mean - level)
-    return (interp1d(time, nodes, fill_value="extrapolate") if time.size > 1 else lambda t: np.full(np.shape(t), nodes[0])), keep
+    return (make_interp_spline(time, nodes, 1) if time.size > 1 else lambda t: np.full(np.shape(t), nodes[0])), keep
 
 
 def _splines(time, mean, weight, bounds):

@@ -72,7 +72,7 @@ def effect_parameters(saved: Diagnosed) -> list:
         title = free(f"Parameters of {effect_words(entry['effect'])}", 120)
         blocks += [Table([title, f"Median [{level_text(saved.level)} interval]", "Unit"], lines, [2, 1.4, 0.8])] if lines else []
         own = sum(map(own_of_a_record, found))
-        blocks += [Note(f"Left out: {own} of single records, such as phases and initial positions.")] if own else []
+        blocks += [Note(f"Left out: {own} of single records, such as phases.")] if own else []
     return blocks
 
 
