@@ -20,7 +20,7 @@ from backdrive_bayes.number_text import ARCMIN_PER_RAD
 CAPTION = (
     "Measured angle against torque (block means, encoder offset removed) with the reducer's settled loop: "
     "median and interval. Beneath: measured minus predicted angle; grey bars span the interval of "
-    "replicated data."
+    "replicated data. The first loading hangs on what was before it and is not fitted."
 )
 
 
