@@ -59,23 +59,37 @@ class Contrasts:
     def log_marginal(self, scale, one_way: Sequence[int] = ()) -> float:
         """Log marginal likelihood for standard deviations of the weights, up to a constant; ``one_way`` numbers weights that have
         half a normal prior, each counted as if it were the only one."""
+        none = np.empty(0, int)
+        return float(self.log_marginals(scale, none, np.empty((1, 0)), one_way)[0])
+
+    def log_marginals(self, scale, columns, sizes, one_way: Sequence[int] = ()) -> np.ndarray:
+        """The same where weights of further ``columns`` (width,) have each of ``sizes`` (n, width) in turn."""
         on, lower, seen = self._solved(scale)
-        chi2, dof = self._chi2(seen), self.noise_dof + self.samples
-        found = -0.5 * dof * np.log1p(chi2 / self.noise_dof) - float(np.log(np.diag(lower)).sum())
-        for weight in one_way:
-            along = solve_triangular(lower, (on == weight).astype(float), lower=True, check_finite=False)
-            spread = np.sqrt((self.noise_dof + chi2) / dof) * np.linalg.norm(along)
-            found += np.log(2.0) + float(log_ndtr(along @ seen / spread))
-        return found
+        across = solve_triangular(lower, scale[on, None] * self.gram[np.ix_(on, columns)], lower=True, check_finite=False)
+        rest, left = self.gram[np.ix_(columns, columns)] - across.T @ across, self.moment[columns] - across.T @ seen
+        along = [solve_triangular(lower, (on == w).astype(float), lower=True, check_finite=False) for w in one_way]
+        base, dof, found = self._chi2(seen), self.noise_dof + self.samples, []
+        for size in sizes:
+            more = np.linalg.cholesky(np.eye(columns.size) + np.outer(size, size) * rest)
+            further = solve_triangular(more, size * left, lower=True, check_finite=False) if columns.size else size
+            chi2 = max(base - float(further @ further), 0.0)
+            volume = np.log(np.diag(lower)).sum() + np.log(np.diag(more)).sum()
+            log = -0.5 * dof * np.log1p(chi2 / self.noise_dof) - float(volume)
+            for own in along:
+                beyond = -np.linalg.solve(more, size * (across.T @ own))
+                spread = np.sqrt((self.noise_dof + chi2) / dof) * np.hypot(np.linalg.norm(own), np.linalg.norm(beyond))
+                log += np.log(2.0) + float(log_ndtr((own @ seen + beyond @ further) / spread))
+            found.append(log)
+        return np.array(found)
 
     def gains(self, scale, columns, sizes) -> np.ndarray:
-        """Approximate gain in log marginal likelihood of each member (members, width) of further ``columns`` with standard
+        """Gain in log marginal likelihood of each member (members, width) of further ``columns`` with standard
         deviations ``sizes`` of their weights, beside weights of ``scale``; averaged over SIZES."""
         whole = np.unique(columns)
         at = np.searchsorted(whole, columns)
         own, lower, seen = self._solved(scale)
         across = solve_triangular(lower, scale[own, None] * self.gram[np.ix_(own, whole)], lower=True, check_finite=False)
-        precision = (self.noise_dof + self.samples) / (self.noise_dof + self._chi2(seen))
+        chi2, dof = self._chi2(seen), self.noise_dof + self.samples
         left = (self.moment[whole] - across.T @ seen)[at] * sizes
         members = across.T[at]
         gram = self.gram[columns[:, :, None], columns[:, None, :]] - members @ members.transpose(0, 2, 1)
@@ -84,7 +98,8 @@ class Contrasts:
         for size in SIZES:
             inner = np.eye(columns.shape[1]) + size**2 * gram
             solved = np.linalg.solve(inner, left[:, :, None])[:, :, 0]
-            found.append(0.5 * precision * size**2 * np.sum(left * solved, axis=1) - 0.5 * np.linalg.slogdet(inner)[1])
+            less = np.minimum(size**2 * np.sum(left * solved, axis=1), chi2)
+            found.append(-0.5 * dof * np.log1p(-less / (self.noise_dof + chi2)) - 0.5 * np.linalg.slogdet(inner)[1])
         return logsumexp(found, axis=0, b=SIZE_WEIGHTS[:, None])
 
     def chi2(self, scale) -> float:

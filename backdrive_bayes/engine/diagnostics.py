@@ -60,10 +60,14 @@ class Convergence:
                 told.append(f"{kind} ESS {int(ess[i])} of {self.names[i]} is below {MIN_ESS:g}")
         return tuple(told)
 
+    @property
+    def least_ess(self) -> float:
+        """Bulk or tail ESS of the quantity that mixes worst."""
+        return float(np.nanmin(np.minimum(self.bulk_ess, self.tail_ess)))
+
     def line(self) -> str:
         """One phrase for a log."""
-        least = np.nanmin(np.minimum(self.bulk_ess, self.tail_ess))
-        return f"R-hat at most {np.nanmax(self.rhat):.3f}, ESS at least {least:.0f} ({self.worst})"
+        return f"R-hat at most {np.nanmax(self.rhat):.3f}, ESS at least {self.least_ess:.0f} ({self.worst})"
 
     def to_json(self) -> dict:
         """The contract's ``convergence`` object."""

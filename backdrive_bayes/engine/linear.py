@@ -19,7 +19,7 @@ class Linear:
 
     ``design`` holds the class and every effect, ``angles`` what its weights explain (tangent effects counted from an undistorted
     bench), ``covariances`` the noise; ``log_scale`` and ``solution`` are those of the joint model, ``predicted`` its
-    block means of the angle.
+    block means of the angle, in which ``waving`` is the part of an encoder's wave.
     """
 
     reduced: Reduced
@@ -34,6 +34,15 @@ class Linear:
     solution: Solution
     jitter: Jitter
     predicted: tuple[np.ndarray, ...]
+    waving: tuple[np.ndarray, ...]
+
+    @property
+    def turned(self) -> list[np.ndarray]:
+        """Block means of the angle that the reducer turns, which an encoder reads with its wave, from the encoder's zero."""
+        found, each = [], zip(self.reduced.angles, self.predicted, self.waving, self.reduced.settled, strict=True)
+        for read, predicted, waving, settled in each:
+            found.append(predicted - waving + np.mean((read - predicted)[settled]))
+        return found
 
     @property
     def log_marginal(self) -> float:

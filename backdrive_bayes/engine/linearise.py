@@ -19,7 +19,7 @@ from backdrive_bayes.engine.design import (
 from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales, whiten
-from backdrive_bayes.engine.periodic import PRICE, WAVE, clearest_wave, periodic_group
+from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.wander import learn_wander
@@ -80,8 +80,13 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     if clear > 0:
         wave = periodic_group(joint, frequency)
         waved = replace(free, fixed=(*fixed, wave)).run(joint.distortion, STEPS, refine=True)
+        # Of a large wave, what the encoder reads is not the angle at which it errs.
+        turned = periodic_group(waved, frequency)
+        nearer = replace(free, fixed=(*fixed, turned)).run(waved.distortion, STEPS, refine=True, jitter=waved.jitter)
+        if nearer.log_marginal > waved.log_marginal:
+            wave, waved = turned, nearer
         beside, more = learn_wander(waved)
-        if waved.log_marginal + more - PRICE > joint.log_marginal + gain:
+        if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain:
             joint, waves, wandering, gain = waved, (wave,), beside, more
     if gain > 0:
         reduced = wandering
@@ -183,8 +188,10 @@ class _Search:
         named = dict(zip(design.names, log_scale, strict=True))
         explained = design.predict(design.split(solution.mean))
         predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
+        waves = {n: w for n, w in design.split(solution.mean).items() if n == WAVE}
+        waving = tuple(w + np.zeros(a.size) for w, a in zip(design.predict(waves), angles, strict=True))
         shared = (self.reduced, reducer, distortion, design, self.effects, angles, tuple(covariances), data)
-        return Linear(*shared, named, solution, jitter, predicted)
+        return Linear(*shared, named, solution, jitter, predicted, waving)
 
     def _solve(self, reducer, design, angles, covariances, known, idle=frozenset()):
         """Whitened data, log scales and weights; ``known`` log scales by name are where the search begins."""

@@ -109,6 +109,8 @@ def _constant(posterior: Posterior) -> dict:
     out["block_record"] = (("block",), _number(b.count.size for b in blocks))
     out["turning_nm"] = (("turn",), _joined(b.turning_nm for b in blocks))
     out["turning_record"] = (("turn",), _number(b.turning_nm.size for b in blocks))
+    out["path_s"], out["path_nm"] = ((("path",), _joined(getattr(b, n) for b in blocks)) for n in ("path_s", "path_nm"))
+    out["path_record"] = (("path",), _number(b.path_s.size for b in blocks))
     out["direction"] = (("leg_number",), _joined(b.direction for b in blocks))
     out[LEGS] = (("leg_number",), _number(b.direction.size for b in blocks))
     out |= {name: (("block",), _joined(getattr(posterior, name))) for name in ARRAYS}

@@ -89,6 +89,7 @@ def _records(constant, observed, names, noise) -> RecordFacts:
         arrays = {n: constant[n].values[own] for n in BLOCKS} | {"angle_rad": observed["angle_rad"].values[own]}
         turning = constant["turning_nm"].values[constant["turning_record"].values == r]
         direction = constant["direction"].values[constant[LEGS].values == r]
+        arrays |= {n: constant[n].values[constant["path_record"].values == r] for n in ("path_s", "path_nm")}
         blocks.append(Blocks(name=name, turning_nm=turning, direction=direction, **arrays))
     rate, amplitude = (constant[n].values for n in ("loading_rate_nm_per_s", "amplitude_nm"))
     return RecordFacts(tuple(names), rate, amplitude, tuple(blocks), tuple(NoiseEstimate(**n) for n in noise))

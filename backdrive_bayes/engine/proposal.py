@@ -22,8 +22,6 @@ EFFICIENT = 0.5
 """Efficiency that is enough: 400 effective draws then take a thousand."""
 LEARNT = 12
 """How often the proposal learns before sampling at most; units whose scales trade for each other want up to eight."""
-BETTER = 1.1
-"""Ratio of efficiencies that is worth to begin anew: less is the error of the two."""
 COMPONENTS, DOF, ROUNDS = 3, 8.0, 12
 """Student-t components of a learnt proposal, their degrees of freedom, and rounds of expectation and maximisation. One holds a
 single peak; two of three a peak and its shoulder; six or ten are no better."""
@@ -69,14 +67,15 @@ class Proposal:
         """Learn later from ``points`` (points, dimension) that it proposed and the target's log density (points,) there."""
         self._waiting.append((self.now, points, log_target))
 
-    def improve(self) -> bool:
-        """Learn from all points so far; whether that makes another proposal than it was."""
+    def improve(self, done: float) -> bool:
+        """Learn from all points so far; whether that makes a proposal with which to begin anew is shorter than to go on, where a
+        share ``done`` of the effective draws is there."""
         before = self.now
         self._weigh()
         self._learn()
         self._weigh()
         chosen, old = int(self.efficiency.argmax()), self.efficiency[self.stages.index(before)]
-        if self.efficiency[chosen] > BETTER * old:
+        if self.efficiency[chosen] * (1.0 - done) > old:
             self.now = self.stages[chosen]
         return self.now is not before
 

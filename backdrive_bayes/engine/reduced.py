@@ -13,10 +13,10 @@ from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.lines import clearest_line
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
-from backdrive_bayes.records.reduction import Blocks, reduce_record
+from backdrive_bayes.records.reduction import Blocks, full_legs, reduce_record
 
-MOST_BLOCKS = 1200
-"""Blocks of all records together beyond which each record gets fewer."""
+MOST_BLOCKS, PER_LEG = 1200, (40, 120)
+"""Blocks of all records together beyond which each leg gets fewer, and the fewest and the most of a full leg."""
 UNREAD = 0.15
 UNREAD_LENGTH = 0.1
 """Torque that acts on the reducer and is not read (ripple, cables), in the torque noise of a sample, and the torque, in shares of
@@ -145,7 +145,6 @@ def reduce_unit(unit: Unit, blocks_per_leg: int | None = None) -> Reduced:
     noise = estimate_common_noise(
         [ChannelRecord(r.time_s, r.torque_nm, r.angle_rad, s) for r, s in zip(unit.records, segments, strict=True)]
     )
-    # A loop from rest has two and a half legs.
-    count = blocks_per_leg or int(np.clip(MOST_BLOCKS / (2.5 * len(unit.records)), 60, 120))
+    count = blocks_per_leg or int(np.clip(MOST_BLOCKS / sum(map(full_legs, unit.records, segments)), *PER_LEG))
     blocks = tuple(reduce_record(r, s, n, count) for r, s, n in zip(unit.records, segments, noise, strict=True))
     return Reduced(blocks, noise, unit)

@@ -9,7 +9,7 @@ import emcee
 import numpy as np
 from emcee.moves import DEMove, Move
 
-from backdrive_bayes.engine.diagnostics import Convergence, diagnose_draws
+from backdrive_bayes.engine.diagnostics import MIN_ESS, Convergence, diagnose_draws
 from backdrive_bayes.engine.marginal import LOG_SCALES, Known, Scales, Whitened
 from backdrive_bayes.engine.proposal import Proposal
 
@@ -104,7 +104,7 @@ def _ensembles(target, centre, root, names, seed, note):
         if convergence.converged or spent >= MOST_STEPS:
             return samplers, convergence
         steps = max(FIRST_STEPS, length // 2)
-        if proposal.improve():
+        if proposal.improve(min(convergence.least_ess / MIN_ESS, 1.0)):
             samplers, states = _begun(target, proposal, [state.random_state for state in states])
             steps = FIRST_STEPS
 

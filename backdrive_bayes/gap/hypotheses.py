@@ -14,7 +14,7 @@ from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
-from backdrive_bayes.engine.periodic import AMPLITUDE, COARSE, fine_bank, wave_group, with_wave
+from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group, with_wave
 from backdrive_bayes.engine.reduced import disturbance
 from backdrive_bayes.engine.traces import trace_of, usual_of
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
@@ -25,6 +25,8 @@ ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
 WAVES = "waves"
 MODULE_CHANGE = 0.05
 """Usual change of a module in shares of itself."""
+TRACE = 0.3
+"""Amplitude of a wave that every bench has, in its angle noise."""
 KINDS = (UNEXPLAINED, "module_change", "uneven", "step", "line")
 """What something unlisted may be: a process on each leg, a module that changes in time, legs of two directions that part, a step
 in time, a line in the spectrum of the noise; each as likely."""
@@ -104,11 +106,25 @@ def _level(table: _Table, names) -> float:
     return solution.log_marginal + linear.data.log_volume + scales.log_prior(log_scale) - log[best] - table.price.get(best, 0.0)
 
 
+@dataclass(frozen=True, eq=False)
+class _Wave:
+    """Columns of a wave among contrasts and their usual sizes, its frequency, what it costs not to know that, and the log prior
+    probability of it."""
+
+    contrasts: Contrasts
+    columns: np.ndarray
+    sizes: np.ndarray
+    frequency: float
+    price: float
+    log_prior: float
+
+
 class _Table:
     """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods."""
 
     def __init__(self, linear: Linear, jumps: Jumps, line: float):
-        waves = replace(wave_group(linear, COARSE.waves), name=WAVES)
+        self.coarse = coarse_bank(phases(linear))
+        waves = replace(wave_group(linear, self.coarse.waves), name=WAVES)
         unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
         self.linear, self.contrasts = linear, make_contrasts(linear, (*effect_groups(linear), *unlisted))
         self.waved = self.contrasts.joined(make_contrasts(linear, (waves,)))
@@ -125,9 +141,11 @@ class _Table:
         # What teeth leave in the block means, without and with an encoder's wave beside.
         self.jumping = {False: _traces(jumps), True: _traces(jumps)}
         self.line = line
+        self.trace_wave = TRACE * linear.reduced.context.angle_noise / AMPLITUDE
         self.frequency: dict[tuple[str, ...], float] = {}
         self.price: dict[tuple[str, ...], float] = {}
-        self._scans: dict[frozenset[str], np.ndarray] = {}
+        self.singles: dict[tuple[str, ...], float] = {}
+        self._waves: dict[frozenset[str], _Wave] = {}
         self._near: dict[int, Contrasts] = {}
 
     def scale(self, on, size: float = 1.0) -> np.ndarray:
@@ -153,14 +171,28 @@ class _Table:
 
     def _of_terms(self, hypothesis, on) -> float:
         if ENCODER in hypothesis:
-            found, frequency, price = self._with_wave(on)
+            wave = self._clearest(on)
             # Beside something unlisted, the first kind is the one whose columns a fit takes.
-            self.frequency.setdefault(hypothesis, frequency)
-            self.price.setdefault(hypothesis, price)
-            return found
-        if not on:
-            return self.contrasts.log_marginal(self.scale(on))
-        return averaged([self.contrasts.log_marginal(self.scale(on, s), self._one_way(on)) for s in SIZES])
+            self.frequency.setdefault(hypothesis, wave.frequency)
+            self.price.setdefault(hypothesis, wave.price)
+            return self._averaged(wave.contrasts, on, wave.columns, wave.sizes) - wave.price
+        # Every bench has a trace of a wave, most likely where a wave is clearest beside one effect.
+        beside = max((h for h in self.singles if set(h) <= set(hypothesis)), key=self.singles.__getitem__, default=())
+        wave = self._clearest(self._on(beside))
+        without, with_trace = self._sized(wave.contrasts, on, wave.columns, (0.0, self.trace_wave) * wave.sizes[:, None])
+        found = float(np.logaddexp(without, with_trace + wave.log_prior))
+        if len(hypothesis) == 1 and UNEXPLAINED not in hypothesis:
+            self.singles[hypothesis] = found
+        return found
+
+    def _sized(self, contrasts, on, columns, sizes) -> list[float]:
+        """Log marginal likelihoods beside the terms ``on``, averaged over their size, for each of ``sizes`` (width, n) of further
+        columns."""
+        found = []
+        for size in SIZES if on else (1.0,):
+            scale = _padded(self.scale(on, size), contrasts)
+            found.append(contrasts.log_marginals(scale, columns, np.transpose(sizes), self._one_way(on)))
+        return [averaged(log) for log in np.transpose(found)] if on else found[0].tolist()
 
     def _one_way(self, on) -> list[int]:
         """Numbers of the weights that cannot be negative."""
@@ -171,7 +203,7 @@ class _Table:
         scale = self.scale(self._on(hypothesis), SIZES[-1])
         if hypothesis not in self.frequency:
             return self.contrasts.chi2(scale)
-        at = int(np.argmin(np.abs(COARSE.members - self.frequency[hypothesis])))
+        at = int(np.argmin(np.abs(self.coarse.members - self.frequency[hypothesis])))
         near, fine, columns = self._about(at)
         member = int(np.argmin(np.abs(fine.members - self.frequency[hypothesis])))
         scale = _padded(scale, near)
@@ -180,7 +212,7 @@ class _Table:
 
     def _about(self, at: int):
         """Contrasts with the waves closely about one of the coarse bank, these waves, and the numbers of their columns."""
-        fine = fine_bank(COARSE.members[at])
+        fine = fine_bank(self.coarse.members[at], phases(self.linear))
         if at not in self._near:
             waves = replace(wave_group(self.linear, fine.waves), name=WAVES)
             self._near[at] = self.contrasts.joined(make_contrasts(self.linear, (waves,)))
@@ -192,39 +224,47 @@ class _Table:
         gains = self.contrasts.gains(self.scale(on), columns, np.full(columns.shape, AMPLITUDE))
         at = int(np.argmax(gains))
         price = gains[at] - (logsumexp(gains) - np.log(gains.size))
-        return self._averaged(self.contrasts, on, columns[at], AMPLITUDE) - price
+        return self._averaged(self.contrasts, on, columns[at], np.full(1, AMPLITUDE)) - price
 
-    def _with_wave(self, on) -> tuple[float, float, float]:
-        """Log marginal likelihood averaged over the frequencies of a wave, the best one, and what it costs not to know it."""
+    def _clearest(self, on) -> _Wave:
+        """The clearest wave beside the terms ``on``, and what it costs not to know its frequency."""
         key = frozenset(on)
-        if key not in self._scans:
-            scale = _padded(self.scale(on), self.waved)
-            self._scans[key] = self.waved.gains(scale, self.contrasts.index.size + COARSE.columns, COARSE.sizes)
-        gains = self._scans[key]
-        at = int(np.argmax(gains))
-        price = gains[at] - (logsumexp(gains) - np.log(gains.size))
-        near, fine, columns = self._about(at)
-        closely = near.gains(_padded(self.scale(on), near), columns, fine.sizes)
+        if key in self._waves:
+            return self._waves[key]
+        scale = _padded(self.scale(on), self.waved)
+        gains = self.waved.gains(scale, self.contrasts.index.size + self.coarse.columns, self.coarse.sizes)
+        weight, fine = log_prior(self.coarse.members), {}
+        for at in _alike(gains + weight, self.coarse.members):
+            near, bank, columns = self._about(at)
+            closely = near.gains(_padded(self.scale(on), near), columns, bank.sizes)
+            gains[at], fine[at] = logsumexp(closely) - np.log(closely.size), (near, bank, columns, closely)
+        at = max(fine, key=lambda at: gains[at] + weight[at])
+        near, bank, columns, closely = fine[at]
         member = int(np.argmax(closely))
-        price += closely[member] - (logsumexp(closely) - np.log(closely.size))
-        return self._averaged(near, on, columns[member], fine.sizes[member]) - price, float(fine.members[member]), float(price)
+        price = closely[member] - logsumexp(gains + weight)
+        chance = weight[at] - np.log(closely.size)
+        wave = _Wave(near, columns[member], bank.sizes[member], float(bank.members[member]), float(price), float(chance))
+        return self._waves.setdefault(key, wave)
 
     def _averaged(self, contrasts, on, columns, sizes) -> float:
         """Log marginal likelihood beside the terms ``on`` averaged over their size and over that of further columns."""
-        found = []
-        for size in SIZES if on else (1.0,):
-            scale = _padded(self.scale(on, size), contrasts)
-            log = []
-            for member in SIZES:
-                scale[columns] = member * sizes
-                log.append(contrasts.log_marginal(scale, self._one_way(on)))
-            found.append(averaged(log))
-        return averaged(found) if on else found[0]
+        return averaged(self._sized(contrasts, on, columns, SIZES * sizes[..., None]))
 
 
 def _traces(jumps: Jumps) -> set[str]:
     """Jumps leave traces in the block means that no slow model explains."""
     return {UNEXPLAINED} if jumps.log_factor > 0 else set()
+
+
+def _alike(gains, frequencies) -> list[int]:
+    """The best member and those with at least half of its gain that it may be a harmonic of, or they of it."""
+    best = int(np.argmax(gains))
+    found = {best}
+    for ratio in (1 / 3, 1 / 2, 2.0, 3.0):
+        at = int(np.argmin(np.abs(frequencies - ratio * frequencies[best])))
+        near = range(max(at - 1, 0), min(at + 2, gains.size))
+        found |= {max(near, key=gains.__getitem__)} if max(gains[k] for k in near) > 0.5 * gains[best] else set()
+    return sorted(found)
 
 
 def _padded(scale, contrasts) -> np.ndarray:

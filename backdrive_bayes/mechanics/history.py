@@ -50,15 +50,11 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
 
     ``offset`` is added to the torque that was read (a share of the scale), ``lag_s`` is by how much the angle channel is late.
     """
-    ends = np.array([blocks.end_s[blocks.leg == k][-1] for k in range(blocks.direction.size)])
-    turns = np.r_[blocks.begin_s[0], ends]
-    time, torque = np.r_[turns, blocks.mid_s], np.r_[blocks.turning_nm, blocks.torque_nm]
-    along = np.argsort(time, kind="stable")
     sampled, who = _samples(blocks)
     share = np.linspace(0.0, 1.0, PIECES + 1)
     pieces = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
     sampled, edges = sampled - lag_s, pieces[blocks.count > FEW].ravel() - lag_s
-    cuts = np.unique(np.r_[edges, sampled, turns[1:-1], pieces[[0, -1], [0, -1]] - lag_s])
+    cuts = np.unique(np.r_[edges, sampled, blocks.path_s[1:-1], pieces[[0, -1], [0, -1]] - lag_s])
     middle = 0.5 * (cuts[1:] + cuts[:-1])
     owner = np.clip(np.searchsorted(blocks.begin_s - lag_s, middle, side="right") - 1, 0, blocks.count.size - 1)
     # What passes in a gap between two blocks is in the mean of neither.
@@ -68,7 +64,7 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     t0, t1 = np.r_[cuts[:-1], sampled], np.r_[cuts[1:], sampled]
     owner, weight = np.r_[owner, who], np.r_[weight, 1.0 / blocks.count[who]]
     order = np.lexsort((t0, t1))
-    z0, z1 = (np.interp(t[order], time[along], torque[along]) / torque_scale_nm + offset for t in (t0, t1))
+    z0, z1 = (np.interp(t[order], blocks.path_s, blocks.path_nm) / torque_scale_nm + offset for t in (t0, t1))
     # A tip is reached from the other side.
     state = "neutral" if not blocks.begins_at_tip else "lower" if blocks.turning_nm[0] > 0 else "upper"
     return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size, state)

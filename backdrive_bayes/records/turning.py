@@ -14,14 +14,24 @@ _TOP_SHARE = 0.003  # a turning point lies no further below the top, in shares o
 _MEDIAN_BLOCKS = 9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
 
 
-def torque_noise(torque_nm: np.ndarray) -> float:
-    """Robust standard deviation of the sample-to-sample torque noise, in N·m."""
+def torque_noise(torque_nm: np.ndarray, time_s: np.ndarray | None = None) -> float:
+    """Robust standard deviation of the sample-to-sample torque noise [N·m].
+
+    Samples without ``time_s`` [s] are taken to be evenly apart.
+    """
     if len(torque_nm) < 3:
         return 0.0
-    # second differences: the ramp itself drops out; twenty thousand of them tell the median to a percent
+    # What a sample is beside its neighbours: the ramp itself drops out; twenty thousand of them tell the median to a percent.
     at = np.arange(0, len(torque_nm) - 2, max(1, len(torque_nm) // 20_000))
-    second = torque_nm[at + 2] - 2.0 * torque_nm[at + 1] + torque_nm[at]
-    return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0))
+    share = np.full(at.size, 0.5)
+    if time_s is not None:
+        span = time_s[at + 2] - time_s[at]
+        share = np.where(span > 0, (time_s[at + 1] - time_s[at]) / np.where(span > 0, span, 1.0), 0.5)
+    beside = torque_nm[at + 1] - (1.0 - share) * torque_nm[at] - share * torque_nm[at + 2]
+    beside = np.abs(beside) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
+    median = float(1.4826 * np.median(beside))
+    # Most samples of a torque that is rounded coarsely are on a line with their neighbours.
+    return median if median > 1e-9 * float(np.ptp(torque_nm)) else float(np.sqrt(np.mean(beside**2)))
 
 
 def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:

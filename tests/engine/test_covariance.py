@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.bench import block_means, even_blocks, known_estimate, noise_paths, raw_covariance
+from support.bench import block_means, even_blocks, known_estimate, noise_paths, path_of, raw_covariance
 
 from backdrive_bayes.bench.known_truth import BenchNoise
 from backdrive_bayes.engine.covariance import BEND_ERROR, block_covariance, local_slope, whitener
@@ -22,6 +22,7 @@ def uneven_blocks(cuts, step_s=1e-3):
     return Blocks(
         "uneven", np.zeros(n), np.zeros(n), variance, begin, begin + count * step_s, count, leg,
         np.array([0.0, 1.0, 0.0]), np.array([1, -1]), np.zeros(n),
+        **path_of(begin, begin + count * step_s, leg, np.zeros(n), np.array([0.0, 1.0, 0.0])),
     )  # fmt: skip
 
 

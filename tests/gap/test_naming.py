@@ -1,12 +1,15 @@
 """What is planted in a unit of the class is named; of a clean one nothing is."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from support.planted import LOOPS, PERIOD_RAD, UNITS, VARIANTS, changed, planted, prepared, smooth_reducer
 
+from backdrive_bayes.engine import periodic
 from backdrive_bayes.engine.infer import prepare
+from backdrive_bayes.gap import hypotheses
 from backdrive_bayes.gap import probabilities as gap
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
@@ -81,6 +84,31 @@ def test_the_period_of_the_wave_is_found():
     assert period == pytest.approx(PERIOD_RAD, rel=0.03)
     other = found("none")[0]
     assert other.linear.reduced.angle_scale_rad / other.frequency[("encoder_error",)] != pytest.approx(PERIOD_RAD, rel=0.03)
+
+
+def _waving(turns, zeros=(0.0, 0.0)):
+    """A unit with an encoder's wave of so many periods over its range, each record read from a zero of its own [angle ranges]."""
+    span = float(np.ptp(UNITS["none"]().records[0].angle_rad))
+    wave = lambda r: 4e-4 * np.cos(2 * np.pi * turns * r.angle_rad / span)  # noqa: E731
+    return changed(UNITS["none"](), lambda r, i: wave(r) + zeros[i] * span)
+
+
+def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
+    """A planted fault: one phase for both records explains little of it."""
+    unit = _waving(6.0, (0.0, 0.24))
+    weighed = weigh(prepare(unit))
+    assert next(iter(gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {})))) == "encoder_error"
+    monkeypatch.setattr(periodic, "phases", lambda linear: 1)
+    monkeypatch.setattr(hypotheses, "phases", lambda linear: 1)
+    wrong = weigh(prepare(replace(unit, name="again")))
+    assert wrong.log_factor[("encoder_error",)] < 0.6 * weighed.log_factor[("encoder_error",)]
+
+
+def test_a_wave_longer_than_the_range_is_an_encoder_error_and_a_soft_flank_is_none():
+    weighed = weigh(prepare(_waving(0.8)))
+    assert next(iter(gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {})))) == "encoder_error"
+    soft = found("asymmetric_stiffness")[0].log_factor
+    assert soft[("asymmetric_stiffness",)] > soft[("encoder_error",)] + 3
 
 
 @pytest.mark.parametrize(("name", "size", "torque"), [("second_backlash", 0.15, 0.3), ("interface_slip", 0.1, None)])

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.bench import path_of
 
 from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
 from backdrive_bayes.mechanics import registry
@@ -46,9 +47,10 @@ def record(rate, sign=1.0, per_leg=30):
     torque = np.concatenate([0.5 * (e[1:] + e[:-1]) for e in edges])
     small, direction = np.zeros(torque.size), (sign * np.array([1, -1, 1])).astype(int)
     leg = np.repeat([0, 1, 2], per_leg)
-    return Blocks(
-        "r", 0.1 * torque, small, small, time[:-1], time[1:], np.full(torque.size, 9), leg, 0.1 * sign * TURNING, direction, small
-    )
+    turning = 0.1 * sign * TURNING
+    path = path_of(time[:-1], time[1:], leg, 0.1 * torque, turning)
+    count = np.full(torque.size, 9)
+    return Blocks("r", 0.1 * torque, small, small, time[:-1], time[1:], count, leg, turning, direction, small, **path)
 
 
 def unit(sign=1.0, rates=RATES):

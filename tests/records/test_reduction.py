@@ -9,8 +9,9 @@ from support.planted import planted
 from backdrive_bayes.engine.infer import _amplitude
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.mechanics.history import of_blocks
-from backdrive_bayes.records import reduction
+from backdrive_bayes.records import reduction, torque_path
 from backdrive_bayes.records.record import Record, Unit
+from backdrive_bayes.records.turning import torque_noise
 
 
 def outer_counts(monkeypatch, hertz, halvings):
@@ -81,13 +82,58 @@ def test_a_record_in_packets_has_no_more_blocks_than_a_whole_one():
     assert cut < 1.2 * whole
 
 
-def test_without_its_kinks_a_resting_torque_would_be_overshot(monkeypatch):
-    """The planted fault: a straight line and nothing beside it."""
-    straight = lambda time, mean, *_: (np.poly1d(np.polyfit(time, mean, 1)), 0.0)  # noqa: E731
-    monkeypatch.setattr(reduction, "_trend", straight)
-    monkeypatch.setattr(reduction, "RADII_PRIOR", np.r_[1.0, np.zeros(reduction.RADII.size - 1)])
-    time, torque = ramped(dwell=0.15)
-    assert reduce_unit(turned(torque, time)).blocks[0].amplitude_nm > 1.003
+def left_of(path_s, path_nm, time, torque, noise=2e-3):
+    """What a path leaves of a torque that has no noise, rms in the noise of a sample."""
+    return float(np.sqrt(np.mean((np.interp(time, path_s, path_nm) - torque) ** 2)) / noise)
+
+
+def stairs(time, steps=8):
+    """A torque that rises in stairs to 1 N·m and on to -1 N·m, with short ramps between, and again."""
+    ramp = np.interp(time, np.array([0.0, 10.0, 30.0, 50.0]), [0.0, 1.0, -1.0, 1.0])
+    return uniform_filter1d(np.round(steps * ramp) / steps, 25)
+
+
+@pytest.mark.parametrize("shape", ["ramp", "dwell", "rounded", "sine", "stairs", "overshoot"])
+def test_the_path_is_what_the_torque_was(shape, monkeypatch):
+    """The planted fault is a path without kinks: of all but ramps it leaves several times the noise."""
+    if shape in ("ramp", "dwell", "rounded"):
+        time, torque = ramped(dwell=2.0 if shape == "dwell" else 0.0, rounding=80 if shape == "rounded" else 1)
+    else:
+        time = np.arange(0.0, 50.0, 2e-3)
+        made = {"sine": np.sin(2 * np.pi * time / 40.0), "stairs": stairs(time)}
+        torque = made.get(shape)
+        if shape == "overshoot":
+            time, torque = ramped(dwell=2.0)
+            torque = torque * (1.0 + 0.02 * (np.abs(torque) > 0.999) * np.abs(np.sin(4 * time)))
+    blocks = reduce_unit(turned(torque, time)).blocks[0]
+    assert left_of(blocks.path_s, blocks.path_nm, time, torque) < (1.0 if shape == "stairs" else 0.5)
+    monkeypatch.setattr(torque_path, "MOST_PIECES", 1)
+    straight = reduce_unit(turned(torque, time)).blocks[0]
+    assert (left_of(straight.path_s, straight.path_nm, time, torque) > 2.0) == (shape in ("dwell", "sine", "stairs", "overshoot"))
+
+
+def test_pieces_meet_at_the_tip_and_not_at_a_sample():
+    time = np.arange(0.0, 50.0, 0.1373)
+    torque = np.interp(time, [0.0, 10.0, 30.0, 50.0], [0.0, 1.0, -1.0, 1.0])
+    blocks = reduce_unit(turned(torque, time, noise=1e-5)).blocks[0]
+    assert np.abs(blocks.turning_nm[1:-1]) == pytest.approx(1.0, abs=1e-4)
+    assert np.abs(torque[time < 40.0]).max() < 0.998
+
+
+def test_noise_is_told_from_uneven_samples_and_from_rounding():
+    """The planted fault: samples taken to be even make noise of a ramp."""
+    rng = np.random.default_rng(2)
+    time = np.cumsum(rng.uniform(0.2e-3, 1.8e-3, 20_000))
+    read = time + 1e-4 * rng.standard_normal(time.size)
+    assert torque_noise(read, time) == pytest.approx(1e-4, rel=0.05)
+    assert torque_noise(read) > 2.5e-4
+    assert 0.0 < torque_noise(np.round(time, 1), time) < 0.1 / np.sqrt(12.0)
+
+
+def test_more_cycles_have_fewer_blocks_a_leg():
+    time, torque = ramps((0, *(1, -1) * 15), rate=0.5, hertz=500.0)
+    many, few = (reduce_unit(turned(torque[:n], time[:n])).blocks[0] for n in (None, 6000))
+    assert many.count.size < 1.6 * 1200 and few.count.size / few.direction.size > 2 * many.count.size / many.direction.size
 
 
 def test_no_block_reaches_over_a_gap():

@@ -32,6 +32,14 @@ def unit_of(seed=0, *, rate=0.05, noise=KNOWN_NOISE, amplitudes=(0.1,), **change
     return simulate_unit(known, [(a, rate) for a in amplitudes], noise, np.random.default_rng(seed))
 
 
+def path_of(begin, end, leg, torque, turning, trend=0.0) -> dict:
+    """The last fields of Blocks: a torque that is straight from turning points to the middles of blocks."""
+    ends = np.array([end[leg == k][-1] for k in np.unique(leg)])
+    time, level = np.r_[begin[0], ends, 0.5 * (begin + end)], np.r_[turning, torque]
+    along = np.argsort(time, kind="stable")
+    return {"torque_trend_nm2": trend + np.zeros(begin.size), "path_s": time[along], "path_nm": level[along]}
+
+
 def even_blocks(samples, size, step_s=1e-3) -> Blocks:
     """Blocks of ``size`` samples each on one rising leg; torque and angle are left at zero."""
     edges = np.arange(0, samples + 1, size)
@@ -40,6 +48,7 @@ def even_blocks(samples, size, step_s=1e-3) -> Blocks:
     return Blocks(
         "even", np.zeros(n), np.zeros(n), np.zeros(n), begin, begin + count * step_s, count,
         np.zeros(n, int), np.array([0.0, 1.0]), np.array([1]), np.zeros(n),
+        **path_of(begin, begin + count * step_s, np.zeros(n, int), np.zeros(n), np.array([0.0, 1.0])),
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from backdrive_bayes.mechanics.effect import Context, Distortion
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
+from support.bench import path_of
 
 LOOPS = ((0.01, 0.1), (0.05, 0.1), (0.1, 0.1))
 CHAINS, DRAWS = 4, 60
@@ -72,7 +73,8 @@ def made_blocks(truth, name, rate, amplitude, rng, per_leg=30) -> Blocks:
     count = np.full(torque.size, 20)
     small = np.full(torque.size, 1e-12)
     leg, direction = np.repeat([0, 1, 2], per_leg), np.array([1, -1, 1])
-    return Blocks(name, torque, angle, small, travel[:-1], travel[1:], count, leg, turning, direction, 0 * torque, small)
+    path = path_of(travel[:-1], travel[1:], leg, torque, turning, 1e-12)
+    return Blocks(name, torque, angle, small, travel[:-1], travel[1:], count, leg, turning, direction, 0 * torque, **path)
 
 
 def _independent(part, weights):

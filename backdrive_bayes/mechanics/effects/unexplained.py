@@ -3,8 +3,11 @@
 import numpy as np
 
 from backdrive_bayes.mechanics.effect import PathEffect
+from backdrive_bayes.mechanics.history import played
 
 NODES = 10
+RETURN = 0.01
+"""Torque that does not end a leg: what the noise and a servo's overshoot do."""
 
 
 class Unexplained(PathEffect):
@@ -20,19 +23,29 @@ class Unexplained(PathEffect):
 
     def responses(self, history, record, context):
         """Hats over the torque of each leg."""
-        direction = np.sign(history.z1 - history.z0)
-        leg = np.r_[0, np.cumsum((direction[1:] * direction[:-1]) < 0)]
-        found = []
+        leg, found = _legs(history.z0[0], history.z1), []
         for z in (history.z0, history.z1):
             columns = np.zeros((z.size, (leg[-1] + 1) * NODES))
             for k in range(leg[-1] + 1):
                 own = np.flatnonzero(leg == k)
                 first, last = history.z0[own[0]], history.z1[own[-1]]
-                share = (z[own] - first) / (last - first) if last != first else np.zeros(own.size)
+                share = np.clip((z[own] - first) / (last - first), 0.0, 1.0) if last != first else np.zeros(own.size)
                 hats = np.maximum(0.0, 1.0 - np.abs(share[:, None] - np.linspace(0, 1, NODES)) * (NODES - 1))
                 columns[own, k * NODES : (k + 1) * NODES] = hats
             found.append(columns)
         return tuple(found)
+
+
+def _legs(first, z1) -> np.ndarray:
+    """Number of the leg of each segment, (segments,): they end where the torque goes back by more than twice RETURN."""
+    moved = np.diff(played(first, z1, RETURN))
+    moving = np.flatnonzero(moved)
+    turns = moving[1:][moved[moving[1:]] * moved[moving[:-1]] < 0]
+    ends = []
+    for begin, turn in zip([0, *turns], turns, strict=False):
+        beyond = z1[begin:turn] * np.sign(moved[moving[moving < turn][-1]])
+        ends.append(begin + int(np.argmax(beyond)))
+    return np.searchsorted(np.array(ends, int), np.arange(z1.size))
 
 
 UNEXPLAINED = Unexplained(
