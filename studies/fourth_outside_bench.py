@@ -154,7 +154,7 @@ def march(t, m, tab, mass, damp, friction, growth, asym, over, under, restick, l
                     d[i] -= A[i, c] * d[c]
                 d[i] /= A[i, i]
             a = 1.0
-            for back in range(14):
+            for _back in range(14):
                 xt = xn - a * d
                 new = assemble(xt, x, v, dt, m[s], tab, z, lim, growth[s], asym, mass, damp, r, K)
                 if new < res * (1 - 1e-3 * a):
@@ -248,7 +248,7 @@ def friction(rng, i, j, fc, mu, group, reach, count, kind):
     """Bristles with spread break-away angles; limits fc + mu * normal load in all."""
     share, far = rng.dirichlet(np.full(count, 3.0)), reach * np.exp(rng.normal(0, 0.6, count))
     level = max(fc + 0.5 * mu, 1e-4)
-    return [(kind, i, j, s * level / d, 0, 1, 0, s * fc, s * mu, group, 1) for s, d in zip(share, far)]
+    return [(kind, i, j, s * level / d, 0, 1, 0, s * fc, s * mu, group, 1) for s, d in zip(share, far, strict=False)]
 
 
 def output_seal(rng, j, fc):
@@ -284,7 +284,7 @@ def make_cycloid(rng):
     gap = lu(rng, 0.003, 0.2)
     gaps = gap * np.clip(rng.normal(1, rng.uniform(0.1, 0.35), count), 0.2, 2)
     k = lu(rng, 3, 10) / count
-    rows = [(CONTACT, -1, 0, k, g, expo, 0, 0, 0, 0, a) for g, a in zip(gaps, arms)]
+    rows = [(CONTACT, -1, 0, k, g, expo, 0, 0, 0, 0, a) for g, a in zip(gaps, arms, strict=False)]
     rows += [film(rng, -1, 0, gap)]
     rows += mesh(rng, 0, 1, lu(rng, 3, 8), gap * rng.uniform(0.1, 0.5), int(rng.integers(4, 9)), 1.1, 0, 1)
     rows += [(SPRING, 1, 2, lu(rng, 3, 12), 0, 1, 0, 0, 0, 0, 1)]
@@ -370,7 +370,7 @@ def draw_records(rng):
         amps[-1], plan = rng.choice([0.4, 0.5, 0.6, 0.7, 0.8]), "one smaller"
     order = rng.permutation(count)
     records, clock, levels = [], 0.0, int(rng.integers(5, 11))
-    for p, a in zip(periods[order], amps[order]):
+    for p, a in zip(periods[order], amps[order], strict=False):
         start, cycles = str(rng.choice(["virgin", "zero", "anywhere"], p=[0.25, 0.35, 0.4])), int(rng.integers(2, 4))
         s0 = 0 if start != "anywhere" else rng.uniform(0, 4)
         warm = 0 if start == "virgin" else 8
@@ -402,7 +402,7 @@ def generalised_play(m, lower, upper):
 
 
 def play_set(m, halves, weights):
-    return sum(w * generalised_play(m, m - h, m + h) for h, w in zip(halves, weights))
+    return sum(w * generalised_play(m, m - h, m + h) for h, w in zip(halves, weights, strict=False))
 
 
 @numba.njit(cache=True)
@@ -418,7 +418,7 @@ def centred_slip(steps, back):
 def kelvin(dt, drive, taus, weights):
     """Strain of Kelvin elements on a uniform time grid."""
     out = np.zeros(len(drive))
-    for tau, w in zip(taus, weights):
+    for tau, w in zip(taus, weights, strict=False):
         a = np.exp(-dt / tau)
         out += w * lfilter([1 - a], [1, -a], drive)
     return out
@@ -665,7 +665,7 @@ def draw_soil(rng, unit, taken):
     """Traces of the channel effects, together below .3 noise."""
     soil = []
     share = rng.dirichlet(np.ones(len(CHANNEL))) ** 0.5 * rng.uniform(0.1, 0.28)
-    for name, w in zip(CHANNEL, share):
+    for name, w in zip(CHANNEL, share, strict=False):
         form = draw_form(rng, name, unit)
         if name not in taken:
             s = form["guess"] * 0.1
@@ -753,7 +753,7 @@ def write_unit(folder, name, unit, effects, soil, rng):
         stamp = np.floor(ts / tick) * tick if coarse else ts
         names = cols or ("time_s", "torque_Nm", "angle_arcmin")
         lines = [",".join(names)] + [f"{a:.9g},{b:.7g},{c:.9g}" for a, b, c in
-                                     zip(stamp * ct, tau * cm, sign * th * unit["peak"] * ca)]
+                                     zip(stamp * ct, tau * cm, sign * th * unit["peak"] * ca, strict=False)]
         file, rate = f"run-{i + 1:02d}{suffix}", 4 * rec["amp"] / rec["period"] * unit["rated"]
         opener = gzip.open if suffix.endswith("gz") else lzma.open if suffix.endswith("xz") else open
         with opener(os.path.join(folder, file), "wt") as h:

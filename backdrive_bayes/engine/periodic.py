@@ -18,7 +18,7 @@ SAME_ZERO = 0.1
 """Middles of loops, in angle scales, that lie closer are read from one zero: drift moves them as far."""
 HARMONICS = 3
 """An interpolation error has harmonics: distorted quadrature signals give the second, flattened ones the third and fourth
-(Heydemann, Appl. Opt. 20, 1981). The k-th is usually 1/k of the first."""
+(Heydemann, Appl. Opt. 20, 1981). The k-th is usually 1/k² of the first."""
 FINE = 9
 """Frequencies about the best one that are tried in turn."""
 NODES = 12
@@ -66,7 +66,7 @@ def periodic_group(linear: Linear, frequency: float) -> Group:
     """A wave with its harmonics, each in proportion to its usual size."""
     order = np.arange(1, HARMONICS + 1)
     group = wave_group(linear, frequency * order)
-    return replace(group, name=WAVE, columns=tuple(c / np.repeat(order, 2) for c in group.columns))
+    return replace(group, name=WAVE, columns=tuple(c / np.repeat(order**2, 2) for c in group.columns))
 
 
 def with_wave(linear: Linear, frequency: float) -> Linear:
@@ -107,7 +107,7 @@ def _bank(members: np.ndarray, waves: np.ndarray, phases: int) -> Bank:
     place = np.clip(np.searchsorted(waves, wanted - 1e-6), 0, waves.size - 1)
     inside = np.abs(waves[place] - wanted) < 1e-5
     columns = _places(place, waves.size, phases)
-    return Bank(members, waves, columns, AMPLITUDE * np.tile(np.repeat(inside / order, 2, axis=1), phases))
+    return Bank(members, waves, columns, AMPLITUDE * np.tile(np.repeat(inside / order**2, 2, axis=1), phases))
 
 
 def _places(place, waves: int, phases: int) -> np.ndarray:

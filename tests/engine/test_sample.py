@@ -241,7 +241,7 @@ def test_a_shoulder_far_from_the_mode_is_found(monkeypatch):
     # The planted fault: slices through the mode, taken as they are, see a part of it and believe it.
     monkeypatch.setattr(proposal_module, "EFFICIENT", 0.0)
     monkeypatch.setattr(proposal_module, "POWERS", (1.0,))
-    monkeypatch.setattr(Proposal, "improve", lambda self: False)
+    monkeypatch.setattr(Proposal, "improve", lambda self, done: False)
     with pytest.raises(AssertionError):
         assert np.all(np.abs([mean(seed) + 0.5 for seed in range(3)]) < 0.12)
 

@@ -104,8 +104,8 @@ def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
     assert wrong.log_factor[("encoder_error",)] < 0.6 * weighed.log_factor[("encoder_error",)]
 
 
-def test_a_wave_longer_than_the_range_is_an_encoder_error_and_a_soft_flank_is_none():
-    weighed = weigh(prepare(_waving(0.8)))
+def test_a_wave_of_one_and_a_half_periods_is_an_encoder_error_and_a_soft_flank_is_none():
+    weighed = weigh(prepare(_waving(1.5)))
     assert next(iter(gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {})))) == "encoder_error"
     soft = found("asymmetric_stiffness")[0].log_factor
     assert soft[("asymmetric_stiffness",)] > soft[("encoder_error",)] + 3
