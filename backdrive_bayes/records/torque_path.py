@@ -7,16 +7,16 @@ dwells, stairs, rounded tips and torque by hand are straight pieces all, of whic
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from backdrive_bayes.records.record import Record
 
-MOST_BINS, MOST_PIECES = 2000, 200
-"""Bins of a leg's samples between which it is cut, and pieces, at most."""
-FEW = 10
-"""Samples below which a leg has none to spare."""
+MOST_BINS, MOST_PIECES = 2000, 1500
+"""Bins of the samples between which a record may be cut, for each leg, and pieces of a record, at most."""
 STRAIGHT = 3e-5
 """Share of a record's torque range by which a piece may bend, though the samples show it."""
 
@@ -45,84 +45,102 @@ class TorquePath:
 def follow_torque(record: Record, segments, sd_nm: float, ends_s: tuple[float, float]) -> TorquePath:
     """The path of a record cut into ``segments``, between the instants ``ends_s``; ``sd_nm`` is the noise of a sample.
 
-    Pieces are lines of their own, and so are legs: they are joined where they meet, else from sample to sample. The samples next
-    to a turning point tell on neither side, for they may lie beyond it.
+    Pieces are lines of their own, joined where they meet, else from sample to sample.
     """
-    bend, pieces, last = STRAIGHT * float(np.ptp(record.torque_nm)), [], []
-    for k, s in enumerate(segments):
-        few = s.stop - s.start < FEW
-        own = slice(s.start + (k > 0 and not few), s.stop - (k + 1 < len(segments) and not few))
-        pieces += _pieces(record.time_s[own], record.torque_nm[own], sd_nm, bend)
-        last.append(len(pieces) - 1)
-    (nodes, values, count), turning = pieces[0], []
+    (nodes, values, count), *rest = _pieces(record.time_s, record.torque_nm, sd_nm, MOST_BINS * len(segments))
     nodes, values, samples = list(nodes), list(values), [count]
-    turning.append(_extended(nodes, values, 0, ends_s[0]))
-    for k, (later, on, count) in enumerate(pieces[1:]):
+    _extend(nodes, values, 0, ends_s[0])
+    for later, on, count in rest:
         slope, beyond = (float(np.diff(v[-2:])[0] / np.diff(t[-2:])[0]) for v, t in ((values, nodes), (on, later)))
         apart = on[0] - values[-1] - beyond * (later[0] - nodes[-1])
         meet = nodes[-1] + apart / (slope - beyond) if slope != beyond else np.inf
-        tip = max(values[-1], on[0], key=lambda value: np.sign(slope) * value)
         if nodes[-2] < meet < later[1]:
-            tip = values[-1] + slope * (meet - nodes[-1])
-            nodes, values, later, on = nodes[:-1], values[:-1], [meet, later[1]], [tip, on[1]]
+            on = [values[-1] + slope * (meet - nodes[-1]), on[1]]
+            nodes, values, later = nodes[:-1], values[:-1], [meet, later[1]]
         else:
             samples.append(1)
-        turning += [float(tip)] if k in last else []
         nodes, values, samples = [*nodes, *later], [*values, *on], [*samples, count]
-    turning.append(_extended(nodes, values, -1, ends_s[1]))
-    return TorquePath(np.array(nodes), np.array(values), np.array(turning), np.array(samples))
+    _extend(nodes, values, -1, ends_s[1])
+    time, torque = np.array(nodes), np.array(values)
+    return TorquePath(time, torque, _turning(record, segments, time, torque), np.array(samples))
 
 
-def _extended(nodes, values, end, time_s) -> float:
-    """The torque where the first or the last piece, drawn out, is at ``time_s``, which becomes its end."""
+def _turning(record, segments, time, torque) -> np.ndarray:
+    """Torque at the ends of the legs (legs + 1,): the farthest that the path goes between the middles of two."""
+    middle = [record.time_s[(s.start + s.stop - 1) // 2] for s in segments]
+    found = [torque[0]]
+    for s, begin, end in zip(segments, middle, middle[1:], strict=False):
+        own = np.r_[np.interp([begin, end], time, torque), torque[(time > begin) & (time < end)]]
+        found.append(s.direction * np.max(s.direction * own))
+    return np.array([*found, torque[-1]])
+
+
+def _extend(nodes, values, end, time_s) -> None:
+    """Draw the first or the last piece out to ``time_s``."""
     inner = 1 if end == 0 else -2
     values[end] += (values[end] - values[inner]) / (nodes[end] - nodes[inner]) * (time_s - nodes[end])
     nodes[end] = time_s
-    return float(values[end])
 
 
-def _pieces(time_s, torque_nm, sd_nm, bend_nm) -> list[tuple]:
-    """Lines through the samples of one leg, in turn: the instants of their first and last sample, the torque there, their number.
+def _pieces(time_s, torque_nm, sd_nm, most) -> list[tuple]:
+    """Lines through samples, in turn: the instants of their first and last sample, the torque there, their number.
 
     The piece is cut that gains most by it, while that is more than a place and another line cost (Schwarz, Annals of Statistics
     6, 1978).
     """
-    edges = np.unique(np.linspace(0, time_s.size, min(time_s.size, MOST_BINS) + 1).astype(int))
+    edges = np.unique(np.linspace(0, time_s.size, min(time_s.size, most) + 1).astype(int))
     count = np.diff(edges)
-    if count.size < 2:
-        return [(time_s[[0, -1]] + [0.0, 1e-9], np.full(2, torque_nm.mean()), time_s.size)]
-    time, mean = (np.add.reduceat(v, edges[:-1]) / count for v in (time_s - time_s[0], torque_nm - torque_nm.mean()))
-    weight = 1.0 / (sd_nm**2 / count + bend_nm**2)
-    sums = np.cumsum(weight * np.stack([np.ones(time.size), time, mean, time**2, time * mean, mean**2]), axis=1)
-    sums = np.pad(sums, ((0, 0), (1, 0)))
-    whole = [_cut(sums, 0, count.size)]
-    while len(whole) < MOST_PIECES:
-        gain, begin, at, end = max(whole)
-        if gain <= 3.0 * np.log(time.size):
-            break
-        whole.remove((gain, begin, at, end))
-        whole += [_cut(sums, begin, at), _cut(sums, at, end)]
+    time, mean = (np.add.reduceat(v, edges[:-1]) / count for v in (time_s, torque_nm))
+    weight = 1.0 / (sd_nm**2 / count + (STRAIGHT * float(np.ptp(torque_nm))) ** 2)
+    cut = lambda begin, end: (*_cut(time[begin:end], mean[begin:end], weight[begin:end]), begin, end)  # noqa: E731
+    waiting, price = [cut(0, count.size)], 3.0 * float(np.log(count.size))
+    done: list[tuple[int, int]] = []
+    while waiting:
+        loss, at, begin, end = heappop(waiting)
+        if -loss <= price or len(waiting) + len(done) >= MOST_PIECES:
+            done.append((begin, end))
+            continue
+        heappush(waiting, cut(begin, begin + at))
+        heappush(waiting, cut(begin + at, end))
+    # A cut that another one made needless is taken back.
+    bounds = [0, *sorted(end for _, end in done)]
+    left = lambda begin, end: float(_line(_sums(time[begin:end], mean[begin:end], weight[begin:end])[:, -1])[2])  # noqa: E731
+    costs = [left(a, c) - left(a, b) - left(b, c) for a, b, c in zip(bounds, bounds[1:], bounds[2:], strict=False)]
+    while costs and min(costs) <= price:
+        k = int(np.argmin(costs)) + 1
+        del bounds[k], costs[k - 1]
+        for j in {k - 1, k} & set(range(1, len(bounds) - 1)):
+            a, b, c = bounds[j - 1 : j + 2]
+            costs[j - 1] = left(a, c) - left(a, b) - left(b, c)
     found = []
-    for _, begin, _, end in sorted(whole, key=lambda cut: cut[1]):
-        level, slope, _ = _line(sums[:, end] - sums[:, begin])
+    for begin, end in pairwise(bounds):
+        level, slope, _ = _line(_sums(time[begin:end], mean[begin:end], weight[begin:end])[:, -1])
         ends = time_s[[edges[begin], edges[end] - 1]]
-        found.append((ends, torque_nm.mean() + level + slope * (ends - time_s[0]), int(edges[end] - edges[begin])))
+        if ends[1] <= ends[0]:
+            ends = ends[0] + np.array([0.0, 1e-9])
+        found.append((ends, mean[begin] + level + slope * (ends - time[begin]), int(edges[end] - edges[begin])))
     return found
 
 
-def _cut(sums, begin: int, end: int) -> tuple[float, int, int, int]:
-    """What the best cut of the bins from ``begin`` to ``end`` gains in twice the log likelihood, with its bounds and place."""
-    places = np.arange(begin + 2, end - 1)
-    if places.size == 0:
-        return 0.0, begin, begin, end
-    first, second = sums[:, places] - sums[:, [begin]], sums[:, [end]] - sums[:, places]
-    left = _line(first)[2] + _line(second)[2]
+def _cut(time, mean, weight) -> tuple[float, int]:
+    """What the best cut of the bins takes off twice the negative log likelihood, as a negative number, and its place."""
+    if time.size < 4:
+        return 0.0, 0
+    sums = _sums(time, mean, weight)
+    first, whole = sums[:, 1:-2], sums[:, [-1]]
+    left = _line(first)[2] + _line(whole - first)[2]
     best = int(np.argmin(left))
-    return float(_line(sums[:, end] - sums[:, begin])[2] - left[best]), begin, int(places[best]), end
+    return float(left[best] - _line(whole)[2][0]), best + 2
+
+
+def _sums(time, mean, weight) -> np.ndarray:
+    """Sums (6, bins) of 1, t, y, t², t·y and y² up to each bin, from the first."""
+    t, y = time - time[0], mean - mean[0]
+    return np.cumsum(weight * np.stack([np.ones(t.size), t, y, t**2, t * y, y**2]), axis=1)
 
 
 def _line(sums):
-    """Level, slope and what is left of weighted lines from their ``sums`` (6, ...) of 1, t, y, t², t·y and y²."""
+    """Level, slope and what is left of weighted lines from their ``sums`` (6, ...)."""
     one, t, y, tt, ty, yy = sums
     wide = np.maximum(tt - t * t / one, 1e-300)
     slope = (ty - t * y / one) / wide

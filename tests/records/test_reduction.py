@@ -95,7 +95,7 @@ def stairs(time, steps=8):
 
 @pytest.mark.parametrize("shape", ["ramp", "dwell", "rounded", "sine", "stairs", "overshoot"])
 def test_the_path_is_what_the_torque_was(shape, monkeypatch):
-    """The planted fault is a path without kinks: of all but ramps it leaves several times the noise."""
+    """The planted fault is a path of one piece."""
     if shape in ("ramp", "dwell", "rounded"):
         time, torque = ramped(dwell=2.0 if shape == "dwell" else 0.0, rounding=80 if shape == "rounded" else 1)
     else:
@@ -109,7 +109,15 @@ def test_the_path_is_what_the_torque_was(shape, monkeypatch):
     assert left_of(blocks.path_s, blocks.path_nm, time, torque) < (1.0 if shape == "stairs" else 0.5)
     monkeypatch.setattr(torque_path, "MOST_PIECES", 1)
     straight = reduce_unit(turned(torque, time)).blocks[0]
-    assert (left_of(straight.path_s, straight.path_nm, time, torque) > 2.0) == (shape in ("dwell", "sine", "stairs", "overshoot"))
+    assert left_of(straight.path_s, straight.path_nm, time, torque) > 2.0
+
+
+def test_a_dwell_is_one_piece():
+    """The planted fault: cuts that are not taken back."""
+    time, torque = ramped(dwell=4.0)
+    blocks = reduce_unit(turned(torque, time)).blocks[0]
+    assert blocks.path_s.size == 2 * blocks.direction.size + 1
+    assert np.abs(blocks.turning_nm[1:-1]) == pytest.approx(1.0, abs=5e-4)
 
 
 def test_pieces_meet_at_the_tip_and_not_at_a_sample():
