@@ -14,6 +14,8 @@ FREQUENCIES = np.arange(0.25, 50.0, 0.125)
 """Waves in one angle scale, from half a wave over the whole range; the spacing is a quarter of a wave over the range."""
 WAVE, AMPLITUDE = "wave", 6e-3
 """Name of the wave's columns in a linear model, and a wave's usual amplitude in shares of the angle scale."""
+MOST_PHASES = 5
+"""Records up to which each may have a phase of its own: the search of more would take minutes."""
 SAME_ZERO = 0.1
 """Middles of loops, in angle scales, that lie closer are read from one zero: drift moves them as far."""
 HARMONICS = 3
@@ -45,7 +47,7 @@ def phases(linear: Linear) -> int:
     """Number of phases of a wave: one of the unit, or one of each record where their zeros differ, for an encoder that was
     zeroed anew, or counts anew, errs at other angles."""
     zeros = [0.5 * (a[s].min() + a[s].max()) for a, s in zip(linear.reduced.angles, linear.reduced.settled, strict=True)]
-    return len(zeros) if np.ptp(zeros) > SAME_ZERO else 1
+    return len(zeros) if np.ptp(zeros) > SAME_ZERO and len(zeros) <= MOST_PHASES else 1
 
 
 def _mean_waves(turn, frequencies) -> np.ndarray:

@@ -1,7 +1,8 @@
 """The path of the torque along a record: straight pieces, as few as the samples ask for.
 
 History operators must not be driven by the noise of the torque channel, and must not be spared what the torque does: ramps,
-dwells, stairs, rounded tips and torque by hand are straight pieces all, of which a sine has many.
+dwells, stairs, rounded tips and torque by hand are straight pieces all, of which a sine has many. Within a leg the path does not
+go back.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+from scipy.optimize import isotonic_regression
 
 from backdrive_bayes.records.record import Record
 
@@ -61,18 +63,32 @@ def follow_torque(record: Record, segments, sd_nm: float, ends_s: tuple[float, f
             samples.append(1)
         nodes, values, samples = [*nodes, *later], [*values, *on], [*samples, count]
     _extend(nodes, values, -1, ends_s[1])
-    time, torque = np.array(nodes), np.array(values)
-    return TorquePath(time, torque, _turning(record, segments, time, torque), np.array(samples))
+    # Samples may share a stamp.
+    time = np.maximum.accumulate(nodes) + 1e-12 * (nodes[-1] - nodes[0]) * np.arange(len(nodes))
+    tips = _tips(record, segments, time, np.array(values))
+    torque = _monotone(np.array(values), np.array(samples, float), tips, [s.direction for s in segments])
+    return TorquePath(time, torque, torque[tips], np.array(samples))
 
 
-def _turning(record, segments, time, torque) -> np.ndarray:
-    """Torque at the ends of the legs (legs + 1,): the farthest that the path goes between the middles of two."""
+def _tips(record, segments, time, torque) -> list[int]:
+    """Knots at which legs begin and end: the farthest between the middles of two."""
     middle = [record.time_s[(s.start + s.stop - 1) // 2] for s in segments]
-    found = [torque[0]]
+    found = [0]
     for s, begin, end in zip(segments, middle, middle[1:], strict=False):
-        own = np.r_[np.interp([begin, end], time, torque), torque[(time > begin) & (time < end)]]
-        found.append(s.direction * np.max(s.direction * own))
-    return np.array([*found, torque[-1]])
+        first, last = np.searchsorted(time, [begin, end])
+        first = min(max(first, found[-1] + 1), time.size - 1)
+        found.append(int(first + np.argmax(s.direction * torque[first : max(last, first + 1)])))
+    return [*found, time.size - 1]
+
+
+def _monotone(torque, samples, tips, directions) -> np.ndarray:
+    """The path without what goes back within a leg, as a motor surges where a clearance is crossed: the tips stay."""
+    weight = np.r_[samples, 0.0] + np.r_[0.0, samples]
+    weight[tips] = 1e6 * weight.max()
+    for direction, begin, end in zip(directions, tips[:-1], tips[1:], strict=True):
+        own = slice(begin, end + 1)
+        torque[own] = direction * isotonic_regression(direction * torque[own], weights=weight[own]).x
+    return torque
 
 
 def _extend(nodes, values, end, time_s) -> None:
@@ -89,6 +105,9 @@ def _pieces(time_s, torque_nm, sd_nm, most) -> list[tuple]:
     6, 1978).
     """
     edges = np.unique(np.linspace(0, time_s.size, min(time_s.size, most) + 1).astype(int))
+    # Samples that share a stamp are of one bin.
+    inner = edges[1:-1]
+    edges = np.r_[0, inner[time_s[inner] > time_s[inner - 1]], time_s.size]
     count = np.diff(edges)
     time, mean = (np.add.reduceat(v, edges[:-1]) / count for v in (time_s, torque_nm))
     weight = 1.0 / (sd_nm**2 / count + (STRAIGHT * float(np.ptp(torque_nm))) ** 2)

@@ -6,8 +6,8 @@ from backdrive_bayes.mechanics.effect import PathEffect
 from backdrive_bayes.mechanics.history import played
 
 NODES = 10
-RETURN = 0.01
-"""Torque that does not end a leg: what the noise and a servo's overshoot do."""
+RETURN = 0.04
+"""Torque, half of it, by which ripples and overshoots go back and end no leg."""
 
 
 class Unexplained(PathEffect):
