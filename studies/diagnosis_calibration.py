@@ -40,7 +40,8 @@ run on `outside` showed that dwells, rounded tips and gaps moved the amplitude a
 of knots. That on `second-outside` (exact 0.35, clean called none 0.36, log score -3.12) showed that thresholds of friction were
 too far apart for amplitudes that differ, that a record which begins at a tip was taken to begin at rest, that slow noise was
 called unknown, that tips of a torque by hand were misplaced, that a torque in stairs was called stick-slip and a body that
-softens a slip. All this was mended before the run shown here, so neither is unseen any more."""
+softens a slip. All this was mended before the run shown here, so neither is unseen any more. The rows of all benches were weighed
+before the torque's path was made of lines and before an encoder's wave had a phase of its own in records of other zeros."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 POSITIVE = ("cool", "warm", "spread")
 """Numbers that are searched on a logarithmic scale."""
