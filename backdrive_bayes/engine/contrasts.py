@@ -59,8 +59,7 @@ class Contrasts:
     def log_marginal(self, scale, one_way: Sequence[int] = ()) -> float:
         """Log marginal likelihood for standard deviations of the weights, up to a constant; ``one_way`` numbers weights that have
         half a normal prior, each counted as if it were the only one."""
-        none = np.empty(0, int)
-        return float(self.log_marginals(scale, none, np.empty((1, 0)), one_way)[0])
+        return float(self.log_marginals(scale, np.empty(0, int), np.empty((1, 0)), one_way)[0])
 
     def log_marginals(self, scale, columns, sizes, one_way: Sequence[int] = ()) -> np.ndarray:
         """The same where weights of further ``columns`` (width,) have each of ``sizes`` (n, width) in turn."""
@@ -69,12 +68,12 @@ class Contrasts:
         rest, left = self.gram[np.ix_(columns, columns)] - across.T @ across, self.moment[columns] - across.T @ seen
         along = [solve_triangular(lower, (on == w).astype(float), lower=True, check_finite=False) for w in one_way]
         base, dof, found = self._chi2(seen), self.noise_dof + self.samples, []
+        volume = float(np.log(np.diag(lower)).sum())
         for size in sizes:
             more = np.linalg.cholesky(np.eye(columns.size) + np.outer(size, size) * rest)
-            further = solve_triangular(more, size * left, lower=True, check_finite=False) if columns.size else size
+            further = np.linalg.solve(more, size * left)
             chi2 = max(base - float(further @ further), 0.0)
-            volume = np.log(np.diag(lower)).sum() + np.log(np.diag(more)).sum()
-            log = -0.5 * dof * np.log1p(chi2 / self.noise_dof) - float(volume)
+            log = -0.5 * dof * np.log1p(chi2 / self.noise_dof) - volume - float(np.log(np.diag(more)).sum())
             for own in along:
                 beyond = -np.linalg.solve(more, size * (across.T @ own))
                 spread = np.sqrt((self.noise_dof + chi2) / dof) * np.hypot(np.linalg.norm(own), np.linalg.norm(beyond))
@@ -83,8 +82,8 @@ class Contrasts:
         return np.array(found)
 
     def gains(self, scale, columns, sizes) -> np.ndarray:
-        """Gain in log marginal likelihood of each member (members, width) of further ``columns`` with standard
-        deviations ``sizes`` of their weights, beside weights of ``scale``; averaged over SIZES."""
+        """Gain in log marginal likelihood of each member (members, width) of further ``columns`` whose weights have standard
+        deviations ``sizes``, beside weights of ``scale``; averaged over SIZES."""
         whole = np.unique(columns)
         at = np.searchsorted(whole, columns)
         own, lower, seen = self._solved(scale)

@@ -16,7 +16,8 @@ from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import Blocks, full_legs, reduce_record
 
 MOST_BLOCKS, PER_LEG = 1200, (40, 120)
-"""Blocks of all records together beyond which each leg gets fewer, and the fewest and the most of a full leg."""
+"""Blocks of all records together beyond which each leg gets fewer, for time grows with their square, and the fewest and the most
+of a full leg."""
 UNREAD = 0.15
 UNREAD_LENGTH = 0.1
 """Torque that acts on the reducer and is not read (ripple, cables), in the torque noise of a sample, and the torque, in shares of

@@ -14,7 +14,7 @@ from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
-from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group, with_wave
+from backdrive_bayes.engine.periodic import AMPLITUDE, TRACE, coarse_bank, fine_bank, log_prior, phases, wave_group, with_wave
 from backdrive_bayes.engine.reduced import disturbance
 from backdrive_bayes.engine.traces import trace_of, usual_of
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
@@ -25,8 +25,6 @@ ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
 WAVES = "waves"
 MODULE_CHANGE = 0.05
 """Usual change of a module in shares of itself."""
-TRACE = 0.3
-"""Amplitude of a wave that every bench has, in its angle noise."""
 KINDS = (UNEXPLAINED, "module_change", "uneven", "step", "line")
 """What something unlisted may be: a process on each leg, a module that changes in time, legs of two directions that part, a step
 in time, a line in the spectrum of the noise; each as likely."""
@@ -123,7 +121,8 @@ class _Table:
     """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods."""
 
     def __init__(self, linear: Linear, jumps: Jumps, line: float):
-        self.coarse = coarse_bank(phases(linear))
+        self.phases = phases(linear)
+        self.coarse = coarse_bank(self.phases)
         waves = replace(wave_group(linear, self.coarse.waves), name=WAVES)
         unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
         self.linear, self.contrasts = linear, make_contrasts(linear, (*effect_groups(linear), *unlisted))
@@ -212,7 +211,7 @@ class _Table:
 
     def _about(self, at: int):
         """Contrasts with the waves closely about one of the coarse bank, these waves, and the numbers of their columns."""
-        fine = fine_bank(self.coarse.members[at], phases(self.linear))
+        fine = fine_bank(self.coarse.members[at], self.phases)
         if at not in self._near:
             waves = replace(wave_group(self.linear, fine.waves), name=WAVES)
             self._near[at] = self.contrasts.joined(make_contrasts(self.linear, (waves,)))

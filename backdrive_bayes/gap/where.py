@@ -69,7 +69,7 @@ def gap_map(linear: Linear, gap: Gap) -> list[dict]:
     for r, blocks in enumerate(linear.reduced.blocks):
         record = next(x for x in linear.reduced.unit.records if x.name == blocks.name)
         cycle = np.array(cycle_numbers(record.torque_nm, find_segments(record.time_s, record.torque_nm)))[blocks.leg]
-        amplitude = float(np.abs(blocks.turning_nm).max())
+        amplitude = float(np.abs(blocks.edges_nm()).max())
         branch = branch_of(blocks.torque_nm, blocks.direction[blocks.leg])
         place = np.minimum((np.abs(blocks.torque_nm) / amplitude * BINS).astype(int), BINS - 1)
         for key in sorted({*zip(cycle.tolist(), branch.tolist(), place.tolist(), strict=True)}):

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backdrive_bayes.records.turning import coarse_turning_points, refine_turning_point, torque_noise
+from backdrive_bayes.records.turning import coarse_turning_points, refine_turning_point
+from backdrive_bayes.records.white_noise import white_noise
 
 RISING = {False: "unload-", True: "load+"}  # keyed by whether the torque is positive
 FALLING = {True: "unload+", False: "load-"}
@@ -58,7 +59,7 @@ def find_branches(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Seg
     A segment that only grazes zero within the noise (the start of a first loading) is not cut.
     """
     torque = np.asarray(torque_nm, float)
-    peak, noise = float(np.abs(torque).max(initial=0.0)), torque_noise(torque)
+    peak, noise = float(np.abs(torque).max(initial=0.0)), white_noise(torque)
     branches: list[Branch] = []
     for segment, cycle in zip(segments, cycle_numbers(torque, segments), strict=True):
         labels = RISING if segment.direction > 0 else FALLING

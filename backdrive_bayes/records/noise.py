@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from backdrive_bayes.records.turning import torque_noise
+from backdrive_bayes.records.white_noise import white_noise
 
 PRIOR_CORRELATION_TIME_S = 0.03
 PRIOR_LOG_SD = 0.5
@@ -78,7 +78,7 @@ def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
     correlated, white, correlation = (float(v) for v in np.exp(theta))
     gradient = _block_gradient(correlated, white, correlation, spectra[0].step_s)
     dof = float(np.clip(2.0 / max(gradient @ covariance @ gradient, 1e-9), 4.0, 1e5))
-    torque = [_white_noise(r.torque_nm, r.time_s) for r in records]
+    torque = [_noise_of(r.torque_nm, r.time_s) for r in records]
     return tuple(
         NoiseEstimate(
             white_rad=white,
@@ -131,7 +131,7 @@ def longest(record: ChannelRecord) -> int:
 
 def _rough_noise(record: ChannelRecord) -> NoiseEstimate:
     """All angle noise taken as white, with the uncertainty of few samples."""
-    angle, torque = (_white_noise(values, record.time_s) for values in (record.angle_rad, record.torque_nm))
+    angle, torque = (_noise_of(values, record.time_s) for values in (record.angle_rad, record.torque_nm))
     floor = 1e-12 * float(np.ptp(record.angle_rad))
     white, correlated = max(angle[0], floor), max(0.1 * angle[0], floor)
     relative = PRIOR_CORRELATION_TIME_S * PRIOR_LOG_SD
@@ -148,7 +148,7 @@ def median_periodogram(record: ChannelRecord) -> Spectrum:
     windows, sway = (values - (values @ basis) @ basis.T for values in (angle, torque))
     # A torque that rises in stairs moves the angle in stairs, which are no noise.
     size = np.maximum(np.mean(sway**2, axis=1), 1e-300)
-    real = np.maximum(0.0, 1.0 - SWAYS * torque_noise(record.torque_nm, record.time_s) ** 2 / size)
+    real = np.maximum(0.0, 1.0 - SWAYS * white_noise(record.torque_nm, record.time_s) ** 2 / size)
     windows = windows - (real * np.mean(sway * windows, axis=1) / size)[:, None] * sway
     taper = np.hanning(length + 2)[1:-1]
     taper = taper / np.sqrt(np.mean(taper**2))
@@ -206,7 +206,7 @@ def _block_gradient(correlated, white, correlation, step):
     return np.array([2 * slow / total, 2 * fast / total, slow / total])
 
 
-def _white_noise(values, time_s):
+def _noise_of(values, time_s):
     """White noise of a channel and its standard error: that of a median has the efficiency .37."""
-    sd = torque_noise(values, time_s)
+    sd = white_noise(values, time_s)
     return sd, sd / float(np.sqrt(2.0 * 0.37 * max(values.size, 1)))

@@ -7,7 +7,8 @@ import numpy as np
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.branches import Segment, find_segments
 from backdrive_bayes.records.record import Record
-from backdrive_bayes.records.turning import block_means, torque_noise
+from backdrive_bayes.records.turning import block_means
+from backdrive_bayes.records.white_noise import white_noise
 
 _FULL_CYCLE = 1.8  # torque travelled over its peak-to-peak value: 2 in a full cycle, 1.5 in three quarters of one
 _LEAST_SIDE = 0.2  # the smaller of the two peaks against the larger
@@ -39,7 +40,7 @@ def why_unfinished(time_s: np.ndarray, torque_nm: np.ndarray) -> str:
     segments = find_segments(time, torque)
     levels = _levels(torque, segments)
     travelled, span = float(np.abs(np.diff(levels)).sum()), float(np.ptp(levels))
-    if span < 5.0 * torque_noise(torque):
+    if span < 5.0 * white_noise(torque):
         return "expected torque that rises and falls, found noise about a constant"
     low, high = min(levels), max(levels)
     seen = f"{low:.4g} to {high:.4g} N·m in {len(segments)} ramp{'s'[: len(segments) != 1]}"

@@ -76,8 +76,11 @@ class Blocks:
         return bool(abs(self.turning_nm[0]) >= AT_TIP * np.abs(self.turning_nm).max())
 
     def edges_nm(self) -> np.ndarray:
-        """Torque at the beginning and the end of each block along the path [N·m], shape (2, blocks)."""
-        return np.interp([self.begin_s, self.end_s], self.path_s, self.path_nm)
+        """Torque at the beginning and the end of each block along the path [N·m], shape (2, blocks), from the first sample to the
+        last."""
+        half = 0.5 * (self.end_s - self.begin_s)[[0, -1]] / self.count[[0, -1]]
+        inside = np.clip([self.begin_s, self.end_s], self.begin_s[0] + half[0], self.end_s[-1] - half[1])
+        return np.interp(inside, self.path_s, self.path_nm)
 
 
 def full_legs(record: Record, segments) -> float:

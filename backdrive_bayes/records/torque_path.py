@@ -18,9 +18,13 @@ from scipy.optimize import isotonic_regression
 from backdrive_bayes.records.record import Record
 
 MOST_BINS, MOST_PIECES = 2000, 1500
-"""Bins of the samples between which a record may be cut, for each leg, and pieces of a record, at most."""
+"""Bins of the samples between which a record may be cut, for each leg, and pieces of a record, at most: a corner is then known to
+a two-thousandth of a leg, and a history is not much longer than its blocks."""
 STRAIGHT = 3e-5
-"""Share of a record's torque range by which a piece may bend, though the samples show it."""
+"""Share of a record's torque range by which a piece may bend, though the samples show it: a sine that is read without noise would
+have a piece for every sample."""
+TIP = 1e6
+"""Weight of a tip, over that of any other knot, where a path is made monotone: it stays where it is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,20 +53,27 @@ def follow_torque(record: Record, segments, sd_nm: float, ends_s: tuple[float, f
 
     Pieces are lines of their own, joined where they meet, else from sample to sample.
     """
-    (nodes, values, count), *rest = _pieces(record.time_s, record.torque_nm, sd_nm, MOST_BINS * len(segments))
-    nodes, values, samples = list(nodes), list(values), [count]
-    _extend(nodes, values, 0, ends_s[0])
-    for later, on, count in rest:
-        slope, beyond = (float(np.diff(v[-2:])[0] / np.diff(t[-2:])[0]) for v, t in ((values, nodes), (on, later)))
-        apart = on[0] - values[-1] - beyond * (later[0] - nodes[-1])
-        meet = nodes[-1] + apart / (slope - beyond) if slope != beyond else np.inf
-        if nodes[-2] < meet < later[1]:
-            on = [values[-1] + slope * (meet - nodes[-1]), on[1]]
-            nodes, values, later = nodes[:-1], values[:-1], [meet, later[1]]
-        else:
-            samples.append(1)
-        nodes, values, samples = [*nodes, *later], [*values, *on], [*samples, count]
-    _extend(nodes, values, -1, ends_s[1])
+    nodes: list[float] = []
+    values: list[float] = []
+    samples: list[int] = []
+    for time_s, torque_nm, count in _pieces(record.time_s, record.torque_nm, sd_nm, MOST_BINS * len(segments)):
+        begin, end = time_s.tolist()
+        first, last = torque_nm.tolist()
+        if nodes:
+            slope, beyond = (values[-1] - values[-2]) / (nodes[-1] - nodes[-2]), (last - first) / (end - begin)
+            apart = first - values[-1] - beyond * (begin - nodes[-1])
+            meet = nodes[-1] + apart / (slope - beyond) if slope != beyond else np.inf
+            if nodes[-2] < meet < end:
+                begin, first = meet, values[-1] + slope * (meet - nodes[-1])
+                del nodes[-1], values[-1]
+            else:
+                samples.append(1)
+        nodes += [begin, end]
+        values += [first, last]
+        samples.append(count)
+    for end, inner in ((0, 1), (-1, -2)):
+        values[end] += (values[end] - values[inner]) / (nodes[end] - nodes[inner]) * (ends_s[end] - nodes[end])
+        nodes[end] = ends_s[end]
     # Samples may share a stamp.
     time = np.maximum.accumulate(nodes) + 1e-12 * (nodes[-1] - nodes[0]) * np.arange(len(nodes))
     tips = _tips(record, segments, time, np.array(values))
@@ -84,18 +95,11 @@ def _tips(record, segments, time, torque) -> list[int]:
 def _monotone(torque, samples, tips, directions) -> np.ndarray:
     """The path without what goes back within a leg, as a motor surges where a clearance is crossed: the tips stay."""
     weight = np.r_[samples, 0.0] + np.r_[0.0, samples]
-    weight[tips] = 1e6 * weight.max()
+    weight[tips] = TIP * weight.max()
     for direction, begin, end in zip(directions, tips[:-1], tips[1:], strict=True):
         own = slice(begin, end + 1)
         torque[own] = direction * isotonic_regression(direction * torque[own], weights=weight[own]).x
     return torque
-
-
-def _extend(nodes, values, end, time_s) -> None:
-    """Draw the first or the last piece out to ``time_s``."""
-    inner = 1 if end == 0 else -2
-    values[end] += (values[end] - values[inner]) / (nodes[end] - nodes[inner]) * (time_s - nodes[end])
-    nodes[end] = time_s
 
 
 def _pieces(time_s, torque_nm, sd_nm, most) -> list[tuple]:
@@ -121,24 +125,30 @@ def _pieces(time_s, torque_nm, sd_nm, most) -> list[tuple]:
             continue
         heappush(waiting, cut(begin, begin + at))
         heappush(waiting, cut(begin + at, end))
-    # A cut that another one made needless is taken back.
-    bounds = [0, *sorted(end for _, end in done)]
-    left = lambda begin, end: float(_line(_sums(time[begin:end], mean[begin:end], weight[begin:end])[:, -1])[2])  # noqa: E731
-    costs = [left(a, c) - left(a, b) - left(b, c) for a, b, c in zip(bounds, bounds[1:], bounds[2:], strict=False)]
-    while costs and min(costs) <= price:
-        k = int(np.argmin(costs)) + 1
-        del bounds[k], costs[k - 1]
-        for j in {k - 1, k} & set(range(1, len(bounds) - 1)):
-            a, b, c = bounds[j - 1 : j + 2]
-            costs[j - 1] = left(a, c) - left(a, b) - left(b, c)
     found = []
-    for begin, end in pairwise(bounds):
+    for begin, end in pairwise(_merged(time, mean, weight, [0, *sorted(end for _, end in done)], price)):
         level, slope, _ = _line(_sums(time[begin:end], mean[begin:end], weight[begin:end])[:, -1])
         ends = time_s[[edges[begin], edges[end] - 1]]
         if ends[1] <= ends[0]:
             ends = ends[0] + np.array([0.0, 1e-9])
         found.append((ends, mean[begin] + level + slope * (ends - time[begin]), int(edges[end] - edges[begin])))
     return found
+
+
+def _merged(time, mean, weight, bounds: list[int], price: float) -> list[int]:
+    """The bounds of pieces less those cuts that others made needless, the cheapest first."""
+
+    def cost(a, b, c):
+        whole, first, second = (_line(_sums(time[k:m], mean[k:m], weight[k:m])[:, -1])[2] for k, m in ((a, c), (a, b), (b, c)))
+        return float(whole - first - second)
+
+    costs = [cost(*bounds[k - 1 : k + 2]) for k in range(1, len(bounds) - 1)]
+    while costs and min(costs) <= price:
+        k = int(np.argmin(costs)) + 1
+        del bounds[k], costs[k - 1]
+        for j in {k - 1, k} & set(range(1, len(bounds) - 1)):
+            costs[j - 1] = cost(*bounds[j - 1 : j + 2])
+    return bounds
 
 
 def _cut(time, mean, weight) -> tuple[float, int]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from backdrive_bayes.records.white_noise import white_noise
+
 SHARE = 0.05  # a reversal smaller than this share of the peak-to-peak torque is ripple
 _MAIN_SHARE = 0.35  # reversals of this share set the length of a typical segment
 _NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the smoothed noise is noise
@@ -12,26 +14,6 @@ _BLOCKS_PER_SEGMENT = 64
 _LINE_POINTS = 2000  # block means lose nothing of a straight line
 _TOP_SHARE = 0.003  # a turning point lies no further below the top, in shares of the range
 _MEDIAN_BLOCKS = 9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
-
-
-def torque_noise(torque_nm: np.ndarray, time_s: np.ndarray | None = None) -> float:
-    """Robust standard deviation of the sample-to-sample torque noise [N·m].
-
-    Samples without ``time_s`` [s] are taken to be evenly apart.
-    """
-    if len(torque_nm) < 3:
-        return 0.0
-    # What a sample is beside its neighbours: the ramp itself drops out; twenty thousand of them tell the median to a percent.
-    at = np.arange(0, len(torque_nm) - 2, max(1, len(torque_nm) // 20_000))
-    share = np.full(at.size, 0.5)
-    if time_s is not None:
-        span = time_s[at + 2] - time_s[at]
-        share = np.where(span > 0, (time_s[at + 1] - time_s[at]) / np.where(span > 0, span, 1.0), 0.5)
-    beside = torque_nm[at + 1] - (1.0 - share) * torque_nm[at] - share * torque_nm[at + 2]
-    beside = np.abs(beside) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
-    median = float(1.4826 * np.median(beside))
-    # Most samples of a torque that is rounded coarsely are on a line with their neighbours.
-    return median if median > 1e-9 * float(np.ptp(torque_nm)) else float(np.sqrt(np.mean(beside**2)))
 
 
 def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
@@ -44,7 +26,7 @@ def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
     if len(torque_nm) < 3:
         return []
     smooth, window = _smoothed(torque_nm)
-    span, noise = float(np.ptp(smooth)), torque_noise(torque_nm)
+    span, noise = float(np.ptp(smooth)), white_noise(torque_nm)
     if not span > 4.0 * noise / np.sqrt(window):
         return []
     block = max(1, _segment_length(smooth, span) // _BLOCKS_PER_SEGMENT)
@@ -95,7 +77,7 @@ def _on_top(clean: np.ndarray, index: int, turn: int, noise: float) -> int:
 def _smoothed(torque: np.ndarray) -> tuple[np.ndarray, int]:
     clean = median_filter(torque, 5, mode="nearest")  # single wild samples are drop-outs, not reversals
     span = float(np.ptp(clean))
-    noise = torque_noise(torque)
+    noise = white_noise(torque)
     if span <= 0.0 or noise <= 0.0:
         return clean, 1
     # as long as the noise asks for, but never so long that a reversal of a short cycle is lost
@@ -154,7 +136,7 @@ def _highest(height: np.ndarray, turn: int) -> int:
 
 def _levelled(height: np.ndarray) -> tuple[np.ndarray, float]:
     """Copy of ``height`` smoothed so far that its levels can be told apart, and the noise left in it."""
-    noise, span = torque_noise(height), float(np.ptp(height))
+    noise, span = white_noise(height), float(np.ptp(height))
     window = int(np.clip((noise / (0.01 * span)) ** 2, 1, max(len(height) // 40, 1))) if span > 0.0 else 1
     return uniform_filter1d(height, window, mode="nearest") if window > 1 else height, noise / np.sqrt(window)
 

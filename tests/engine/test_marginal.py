@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import block_diag, null_space
 from scipy.stats import invgamma, multivariate_normal, multivariate_t
 
-from backdrive_bayes.engine.contrasts import Contrasts
+from backdrive_bayes.engine.contrasts import SIZES as SIZES_OF_EFFECTS
+from backdrive_bayes.engine.contrasts import Contrasts, averaged
 from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, Whitened, _slopes, find_scales, whiten
 
 SIZES, WEIGHTS, DOF = (30, 22), 9, 25.0
@@ -232,3 +233,20 @@ def test_a_weight_of_one_sign_halves_its_prior(problem):
     assert np.logaddexp(*halves) - np.log(2.0) == pytest.approx(both)
     sign = np.sign(data.solve(np.maximum(scale, 1e-12)).mean[1])
     assert max(halves) == pytest.approx(both + np.log(2.0), abs=0.05) and (halves[0] > halves[1]) == (sign > 0)
+
+
+def test_further_columns_weigh_as_if_they_had_been_there_and_gains_are_exact(problem):
+    """The planted fault: a gain that is linear in what is explained, as at a noise that does not answer."""
+    data = whiten(*problem, DOF)
+    none = np.zeros((0, GROUP.size))
+    contrasts = Contrasts((), GROUP, data.gram, data.moment, data.total, data.samples, data.noise_dof, none, none)
+    base, size, columns = np.repeat([1.0, 0.2, 0.0], 3), np.array([0.7, 0.7, 1.4]), np.arange(6, 9)
+    whole = base.copy()
+    whole[columns] = size
+    found = contrasts.log_marginals(base, columns, np.stack([0.0 * size, size]), [1])
+    assert found == pytest.approx([contrasts.log_marginal(base, [1]), contrasts.log_marginal(whole, [1])])
+    each = contrasts.log_marginals(base, columns, SIZES_OF_EFFECTS[:, None] * size)
+    exact = averaged(each) - contrasts.log_marginal(base)
+    assert contrasts.gains(base, columns[None], size[None]) == pytest.approx([exact])
+    linear = 0.5 * (data.noise_dof + data.samples) * (1.0 - contrasts.chi2(whole) / contrasts.chi2(base))
+    assert abs(linear - exact) > 0.05 * abs(exact)

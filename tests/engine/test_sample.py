@@ -246,6 +246,16 @@ def test_a_shoulder_far_from_the_mode_is_found(monkeypatch):
         assert np.all(np.abs([mean(seed) + 0.5 for seed in range(3)]) < 0.12)
 
 
+@pytest.mark.parametrize(("done", "anew"), [(0.0, True), (0.95, False)])
+def test_sampling_begins_anew_only_where_that_is_shorter(done, anew):
+    """A proposal some times better is worth it at the start, and not when nearly all draws are there."""
+    proposal = Proposal(counted(shouldered), np.zeros(2), np.diag([0.25, 0.7]), np.random.RandomState(0))
+    best = int(proposal.efficiency.argmax())
+    worse = [k for k, e in enumerate(proposal.efficiency) if 0.1 < e / proposal.efficiency[best] < 0.8]
+    proposal.now = proposal.stages[worse[0]]
+    assert proposal.improve(done) == anew
+
+
 def counted(density):
     density.evaluations = 0
     return density

@@ -36,7 +36,7 @@ def test_shares_sum_to_one(name):
     cells = where.gap_map(*gap_of(name))
     assert sum(c["share"] for c in cells) == pytest.approx(1.0) and min(c["share"] for c in cells) >= 0
     assert {c["branch"] for c in cells} == set(where.BRANCHES) and len({c["record"] for c in cells}) == 2
-    assert all(-0.1002 <= c["torque_lo_Nm"] < c["torque_hi_Nm"] <= 0.1002 for c in cells)
+    assert all(-0.1001 <= c["torque_lo_Nm"] < c["torque_hi_Nm"] <= 0.1001 for c in cells)
 
 
 def test_a_step_in_one_record_lies_in_that_record():

@@ -11,7 +11,7 @@ from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.mechanics.history import of_blocks
 from backdrive_bayes.records import reduction, torque_path
 from backdrive_bayes.records.record import Record, Unit
-from backdrive_bayes.records.turning import torque_noise
+from backdrive_bayes.records.white_noise import white_noise
 
 
 def outer_counts(monkeypatch, hertz, halvings):
@@ -137,9 +137,9 @@ def test_noise_is_told_from_uneven_samples_and_from_rounding():
     rng = np.random.default_rng(2)
     time = np.cumsum(rng.uniform(0.2e-3, 1.8e-3, 20_000))
     read = time + 1e-4 * rng.standard_normal(time.size)
-    assert torque_noise(read, time) == pytest.approx(1e-4, rel=0.05)
-    assert torque_noise(read) > 2.5e-4
-    assert 0.0 < torque_noise(np.round(time, 1), time) < 0.1 / np.sqrt(12.0)
+    assert white_noise(read, time) == pytest.approx(1e-4, rel=0.05)
+    assert white_noise(read) > 2.5e-4
+    assert 0.0 < white_noise(np.round(time, 1), time) < 0.1 / np.sqrt(12.0)
 
 
 def test_more_cycles_have_fewer_blocks_a_leg():

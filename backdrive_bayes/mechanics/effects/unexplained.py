@@ -6,8 +6,8 @@ from backdrive_bayes.mechanics.effect import PathEffect
 from backdrive_bayes.mechanics.history import played
 
 NODES = 10
-RETURN = 0.04
-"""Torque, half of it, by which ripples and overshoots go back and end no leg."""
+ROUNDING = 1e-9
+"""Torque by which the last digits of a torque at rest go back and end no leg."""
 
 
 class Unexplained(PathEffect):
@@ -29,7 +29,7 @@ class Unexplained(PathEffect):
             for k in range(leg[-1] + 1):
                 own = np.flatnonzero(leg == k)
                 first, last = history.z0[own[0]], history.z1[own[-1]]
-                share = np.clip((z[own] - first) / (last - first), 0.0, 1.0) if last != first else np.zeros(own.size)
+                share = (z[own] - first) / (last - first) if last != first else np.zeros(own.size)
                 hats = np.maximum(0.0, 1.0 - np.abs(share[:, None] - np.linspace(0, 1, NODES)) * (NODES - 1))
                 columns[own, k * NODES : (k + 1) * NODES] = hats
             found.append(columns)
@@ -37,15 +37,11 @@ class Unexplained(PathEffect):
 
 
 def _legs(first, z1) -> np.ndarray:
-    """Number of the leg of each segment, (segments,): they end where the torque goes back by more than twice RETURN."""
-    moved = np.diff(played(first, z1, RETURN))
+    """Number of the leg of each segment, (segments,); the torque may rest within one."""
+    moved = np.diff(played(first, z1, ROUNDING))
     moving = np.flatnonzero(moved)
     turns = moving[1:][moved[moving[1:]] * moved[moving[:-1]] < 0]
-    ends = []
-    for begin, turn in zip([0, *turns], turns, strict=False):
-        beyond = z1[begin:turn] * np.sign(moved[moving[moving < turn][-1]])
-        ends.append(begin + int(np.argmax(beyond)))
-    return np.searchsorted(np.array(ends, int), np.arange(z1.size))
+    return np.searchsorted(turns, np.arange(z1.size), side="right")
 
 
 UNEXPLAINED = Unexplained(
