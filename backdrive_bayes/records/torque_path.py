@@ -23,6 +23,8 @@ a two-thousandth of a leg, and a history is not much longer than its blocks."""
 STRAIGHT = 3e-5
 """Share of a record's torque range by which a piece may bend, though the samples show it: a sine that is read without noise would
 have a piece for every sample."""
+APART = 2.0
+"""Torque, in the noise of a sample, from which on two lines are apart at a sample."""
 TIP = 1e6
 """Weight of a tip, over that of any other knot, where a path is made monotone: it stays where it is."""
 
@@ -61,9 +63,11 @@ def follow_torque(record: Record, segments, sd_nm: float, ends_s: tuple[float, f
         first, last = torque_nm.tolist()
         if nodes:
             slope, beyond = (values[-1] - values[-2]) / (nodes[-1] - nodes[-2]), (last - first) / (end - begin)
-            apart = first - values[-1] - beyond * (begin - nodes[-1])
+            apart, over = first - values[-1] - beyond * (begin - nodes[-1]), first - values[-1] - slope * (begin - nodes[-1])
             meet = nodes[-1] + apart / (slope - beyond) if slope != beyond else np.inf
-            if nodes[-2] < meet < end:
+            # Beyond its own samples a line is only followed where the other's do not tell them apart.
+            early, late = meet < nodes[-1] and abs(apart) > APART * sd_nm, meet > begin and abs(over) > APART * sd_nm
+            if nodes[-2] < meet < end and not early and not late:
                 begin, first = meet, values[-1] + slope * (meet - nodes[-1])
                 del nodes[-1], values[-1]
             else:
@@ -82,14 +86,16 @@ def follow_torque(record: Record, segments, sd_nm: float, ends_s: tuple[float, f
 
 
 def _tips(record, segments, time, torque) -> list[int]:
-    """Knots at which legs begin and end: the farthest between the middles of two."""
+    """Knots at which legs begin and end: the farthest between the middles of two. So are those of the first and the last leg, for
+    a record may begin or end with a bit of another, too short for one of its own."""
     middle = [record.time_s[(s.start + s.stop - 1) // 2] for s in segments]
-    found = [0]
-    for s, begin, end in zip(segments, middle, middle[1:], strict=False):
+    first = max(int(np.searchsorted(time, middle[0])), 1)
+    found = [int(np.argmin(segments[0].direction * torque[:first]))]
+    for s, begin, end in zip(segments, middle, [*middle[1:], np.inf], strict=True):
         first, last = np.searchsorted(time, [begin, end])
         first = min(max(first, found[-1] + 1), time.size - 1)
         found.append(int(first + np.argmax(s.direction * torque[first : max(last, first + 1)])))
-    return [*found, time.size - 1]
+    return found
 
 
 def _monotone(torque, samples, tips, directions) -> np.ndarray:

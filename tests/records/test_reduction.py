@@ -132,6 +132,32 @@ def test_pieces_meet_at_the_tip_and_not_at_a_sample():
     assert np.abs(torque[time < 40.0]).max() < 0.998
 
 
+@pytest.mark.parametrize("reached", [(0, 1, -1, 1, 0.93), (0.93, 1, -1, 1, -1, -0.93), (0.05, 0, 1, -1, 0.1)], ids=str)
+def test_a_bit_of_a_leg_at_an_end_bends_no_other(reached):
+    """It is too short for a leg of its own, and the path of its neighbour is not to make up for it."""
+    time, torque = ramps(reached, rate=0.1, hertz=50.0)
+    blocks = reduce_unit(turned(torque, time)).blocks[0]
+    assert np.abs(np.interp(time, blocks.path_s, blocks.path_nm) - torque).max() < 6e-3
+    assert np.abs(blocks.turning_nm[1:-1]) == pytest.approx(1.0, abs=4e-3)
+
+
+def test_short_rests_between_fast_rises_are_followed(monkeypatch):
+    """Dead weights put on by hand: lines that rest are joined by what was read between, not where they would meet. The planted
+    fault joins them wherever that is."""
+    rng = np.random.default_rng(5)
+    level = np.r_[np.arange(0, 8), np.arange(6, -8, -1), np.arange(-6, 8)] / 7.0
+    torque = uniform_filter1d(np.repeat(level, rng.integers(6, 14, level.size)), 2, mode="nearest")
+    time = 0.07 * np.arange(torque.size)
+
+    def most(seed):
+        blocks = reduce_unit(turned(torque, time, noise=1.5e-3, seed=seed)).blocks[0]
+        return float(np.abs(np.interp(time, blocks.path_s, blocks.path_nm) - torque).max())
+
+    assert max(map(most, range(4))) < 0.035
+    monkeypatch.setattr(torque_path, "APART", np.inf)
+    assert max(map(most, range(4))) > 0.042
+
+
 def test_noise_is_told_from_uneven_samples_and_from_rounding():
     """The planted fault: samples taken to be even make noise of a ramp."""
     rng = np.random.default_rng(2)
