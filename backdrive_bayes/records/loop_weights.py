@@ -10,6 +10,7 @@ from backdrive_bayes.records.record import Record
 from backdrive_bayes.records.shape import turning_levels
 
 _FULL = 0.9  # of the longest ramp: shorter ones are minor loops or the first loading
+_CLOSED = 0.02  # of a ramp, between the torques at which a cycle begins and ends: a ramp cut short by the record's end is no cycle
 _AT_REST = 0.15  # of the amplitude: what begins and ends this near zero torque is a first cycle
 _TIP_SHARES = (0.025, 0.05, 0.1)  # of a full ramp's samples, next to a tip
 _ZERO_SHARE = 0.0025  # of a full ramp's samples, on either side of zero torque: branches bend within a percent of T
@@ -22,11 +23,13 @@ _MOST_CYCLES = 20
 class Cycles:
     """Where a record's cycles are: numbers of their first segments, sample bounds [start, stop), amplitude [N·m].
 
-    ``slope_rad_per_nm`` is the angle's mean slope over the torque.
+    ``gaps`` are each cycle's last torque beyond its first one, in shares of its first ramp; ``slope_rad_per_nm`` is the
+    angle's mean slope over the torque.
     """
 
     settled: bool
     starts: tuple[int, ...]
+    gaps: tuple[float, ...]
     bounds: tuple[tuple[int, int], ...]
     amplitude_nm: float
     slope_rad_per_nm: float
@@ -41,7 +44,8 @@ def cycles_of(record: Record, segments) -> Cycles | None:
     levels = np.r_[start, turning_levels(record.torque_nm, (*segments, segments[-1]))]
     ramps = np.abs(np.diff(levels))
     full, amplitude = ramps >= _FULL * ramps.max(), 0.5 * float(ramps.max())
-    pairs = [k for k in range(len(segments) - 1) if full[k] and full[k + 1]]
+    closed = np.abs(levels[2:] - levels[:-2]) <= _CLOSED * ramps.max()
+    pairs = [k for k in range(len(segments) - 1) if full[k] and full[k + 1] and closed[k]]
     starts = tuple(k for k in pairs if (pairs[-1] - k) % 2 == 0)[-_MOST_CYCLES:]
     if not starts:
         rest = len(segments) == 3 and full[1] and np.all(ends <= _AT_REST * amplitude)
@@ -51,7 +55,8 @@ def cycles_of(record: Record, segments) -> Cycles | None:
     last = 1 if pairs else 2
     bounds = tuple((segments[k].start, segments[k + last].stop) for k in starts)
     slope = float(np.ptp(record.angle_rad)) / (2.0 * amplitude)
-    return Cycles(bool(pairs), starts, bounds, amplitude, slope)
+    gaps = tuple(float((levels[k + 2] - levels[k]) / (levels[k + 1] - levels[k])) for k in starts)
+    return Cycles(bool(pairs), starts, gaps, bounds, amplitude, slope)
 
 
 def area_weights(torque_nm: np.ndarray) -> np.ndarray:
@@ -59,11 +64,15 @@ def area_weights(torque_nm: np.ndarray) -> np.ndarray:
     return 0.5 * (np.roll(torque_nm, 1) - np.roll(torque_nm, -1))
 
 
-def settled_cycle(record: Record, segments, k: int) -> dict:
-    """Weights (samples,) of area, height, widths (None where zero torque is not passed) and drift of ramps k and k + 1."""
+def settled_cycle(record: Record, segments, k: int, gap: float) -> dict:
+    """Weights (samples,) of area, height, widths (None where zero torque is not passed) and drift of ramps k and k + 1.
+
+    A cycle that ends at another torque than it began at (by the share ``gap`` of its first ramp) ends at another angle too,
+    without any drift: by as much of the chord between its tips. ``closing`` are the weights of what that is worth in area.
+    """
     start, stop = segments[k].start, segments[k + 1].stop
     first, middle, last = (_tip_weights(record, segments, edge) for edge in (k, k + 1, k + 2))
-    drift = last - first
+    drift = last - first - gap * (middle - first)
     share = np.zeros(len(record.time_s))
     share[start:stop] = np.linspace(0.0, 1.0, stop - start)
     area = np.zeros(len(record.time_s))
@@ -72,10 +81,11 @@ def settled_cycle(record: Record, segments, k: int) -> dict:
     widths = _both_widths(record, segments, k)
     if widths is not None:
         widths = widths - np.outer(widths @ share, drift)
-    return {"area": area - (area @ share) * drift, "height": height, "widths": widths, "drift": drift}
+    closing = (area @ share) * gap * (middle - first)
+    return {"area": area - (area @ share) * drift, "height": height, "widths": widths, "drift": drift, "closing": closing}
 
 
-def first_cycle(record: Record, segments, k: int) -> dict:
+def first_cycle(record: Record, segments, k: int, gap: float) -> dict:
     """As ``settled_cycle`` for ramps k to k + 2 from rest to rest, of which the middle one is full; no drift is taken out."""
     start, stop = segments[k].start, segments[k + 2].stop
     area = np.zeros(len(record.time_s))
@@ -83,7 +93,8 @@ def first_cycle(record: Record, segments, k: int) -> dict:
     before, after = (_tip_weights(record, segments, edge) for edge in (k + 1, k + 2))
     height = 0.5 * segments[k + 1].direction * (after - before)
     widths = _both_widths(record, segments, k + 1)
-    return {"area": area, "height": height, "widths": widths, "drift": np.zeros(len(record.time_s))}
+    none = np.zeros(len(record.time_s))
+    return {"area": area, "height": height, "widths": widths, "drift": none, "closing": none}
 
 
 def _tip_weights(record: Record, segments, edge: int) -> np.ndarray:
@@ -109,8 +120,8 @@ def _zero_weights(record: Record, segment) -> np.ndarray | None:
     """Weights (2, samples) that read the angle at zero torque on one ramp, None where the ramp does not pass it."""
     torque = segment.direction * record.torque_nm[segment.start : segment.stop]
     time = record.time_s[segment.start : segment.stop]
-    crossing, count = int(np.count_nonzero(torque < 0.0)), len(torque)
-    reach = zero_reach(count)
+    crossing, count = _crossing(torque), len(torque)
+    reach = _zero_reach(count)
     windows = [_about(crossing, times * reach, count) for times in (1, 2)]
     # The torque is a straight ramp over more samples than the angle is: its zero is known better than they tell.
     wide = _about(crossing, max(int(RAMP_SHARE * count), 2 * reach), count)
@@ -126,7 +137,21 @@ def _zero_weights(record: Record, segment) -> np.ndarray | None:
     return np.stack([_line_weights(record, span, at) for span in spans])
 
 
-def zero_reach(count: int) -> int:
+def zero_torque_nm(record: Record, segment) -> float:
+    """Torque on either side of zero [N·m] over which the width's samples of one ramp lie: none where the torque rests there."""
+    torque = segment.direction * record.torque_nm[segment.start : segment.stop]
+    near = _about(_crossing(torque), _zero_reach(len(torque)), len(torque))
+    time = record.time_s[segment.start : segment.stop][near]
+    slope = np.polyfit(time - time.mean(), torque[near], 1)[0]
+    return 0.5 * abs(float(slope)) * float(time[-1] - time[0]) * len(time) / (len(time) - 1)
+
+
+def _crossing(torque: np.ndarray) -> int:
+    """Number of the sample at which a rising torque passes zero, the middle one where it rests there."""
+    return (int(np.count_nonzero(torque < 0.0)) + int(np.count_nonzero(torque <= 0.0))) // 2
+
+
+def _zero_reach(count: int) -> int:
     """Samples on either side of zero torque that the width is read from, on a ramp of ``count`` samples."""
     return max(int(_ZERO_SHARE * count), _LEAST // 2)
 

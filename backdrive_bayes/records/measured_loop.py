@@ -13,7 +13,7 @@ from scipy.linalg import solve_banded
 
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.faults import gaps_after
-from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle, zero_reach
+from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle, zero_torque_nm
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
 
@@ -56,8 +56,11 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
         return None
     weights = settled_cycle if found.settled else first_cycle
     # One cycle at a time: their weights are as long as the record.
-    mean = _mean(weights(record, segments, k) for k in found.starts)
+    mean = _mean(weights(record, segments, k, gap) for k, gap in zip(found.starts, found.gaps, strict=True))
     area, height, drift = mean["area"], mean["height"], mean["drift"]
+    # The chord stands for the slope at the tip, which may be half as much again, or half of it.
+    closing = 0.5 * float(mean["closing"] @ record.angle_rad)
+    errors = [_angle_error(record, area, noise), _torque_error(record, found, noise), _gap_error(record, found), closing]
     width, width_sd = _width(record, found, mean.get("widths"), noise)
     return MeasuredLoop(
         record=record.name,
@@ -66,14 +69,12 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
         amplitude_nm=found.amplitude_nm,
         drift_rad=float(drift @ record.angle_rad),
         loop_area_j=float(area @ record.angle_rad),
-        loop_area_j_sd=float(
-            np.linalg.norm([_angle_error(record, area, noise), _torque_error(record, found, noise), _gap_error(record, found)])
-        ),
+        loop_area_j_sd=float(np.linalg.norm(errors)),
         half_peak_to_peak_rad=float(height @ record.angle_rad),
         half_peak_to_peak_rad_sd=float(np.hypot(_angle_error(record, height, noise), _corner_error(found))),
         zero_torque_width_rad=width,
         zero_torque_width_rad_sd=width_sd,
-        zero_nm=_zero_nm(found),
+        zero_nm=0.0 if width is None else float(np.mean([zero_torque_nm(record, segments[k + 1]) for k in found.starts])),
     )
 
 
@@ -97,12 +98,6 @@ def _width(record: Record, found, weights, noise) -> tuple[float | None, float |
     ramp = 2.0 * RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0]) / 2.0
     torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(found.starts)))
     return float(short), float(np.sqrt(_angle_error(record, weights[0], noise) ** 2 + torque**2 + (long - short) ** 2))
-
-
-def _zero_nm(found) -> float:
-    """Torque on either side of zero from which the width is read [N·m]."""
-    count = int(np.mean([stop - start for start, stop in found.bounds])) // 2
-    return 2.0 * found.amplitude_nm * zero_reach(count) / count
 
 
 def _angle_error(record: Record, weights: np.ndarray, noise: NoiseEstimate) -> float:

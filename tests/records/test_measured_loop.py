@@ -98,3 +98,37 @@ def test_twins_have_the_areas_that_are_told_of_them(shared_data):
     found = {m.record: m for m in measured_loops(unit)}["rate-0.05-amp-0.1.csv.gz"]
     assert found.loop_area_j == pytest.approx(1.941e-3, abs=4 * found.loop_area_j_sd)
     assert found.half_peak_to_peak_rad == pytest.approx(350.4 * np.pi / 10800, abs=4 * found.half_peak_to_peak_rad_sd)
+
+
+@pytest.mark.parametrize("cut", [0.005, 0.015])
+def test_a_cycle_that_ends_short_of_its_tip_keeps_its_area(cut):
+    """A record is cut somewhere: the angle that the missing torque is worth is no drift."""
+    time, torque = ramps((0, 1, -1, 1 - 2 * cut), hertz=2000)
+    found = loop(torque, play(torque), time)
+    assert found.loop_area_j == pytest.approx(TRUTH[0], rel=0.25 * cut / 0.005)
+    assert abs(found.loop_area_j - TRUTH[0]) < found.loop_area_j_sd + 0.01 * TRUTH[0]
+
+
+def test_a_ramp_cut_short_by_the_records_end_is_no_cycle():
+    """Of two full ramps and most of a third the first two count, not the two that do not end where they began."""
+    time, torque = ramps((0, 1, -1, 1, -0.85), hertz=500)
+    found = loop(torque, play(torque), time)
+    assert (found.basis, found.cycles) == ("settled", 1)
+    assert found.loop_area_j == pytest.approx(TRUTH[0], rel=0.01)
+
+
+def test_the_width_of_a_rest_at_zero_torque_is_that_at_zero():
+    """Where the torque rests the samples of the width lie at zero, however many of the ramp's they are."""
+    time, torque = ramps((0, 1, -1, 1), hertz=100)
+    rested = np.interp(time, *_with_rests(time, torque))
+    found, swept = loop(rested, play(rested), time), loop(torque, play(torque), time)
+    assert found.zero_nm < 0.1 * swept.zero_nm
+    assert found.zero_torque_width_rad == pytest.approx(TRUTH[2], rel=0.01)
+
+
+def _with_rests(time, torque):
+    """Times and torques of the corners of a path that rests at zero torque for a fifth of a second."""
+    at = np.flatnonzero(np.diff(np.sign(torque)))[1:]
+    knots = sorted([(time[i] - 0.1, torque[i] * 0.0) for i in at] + [(time[i] + 0.1, 0.0) for i in at])
+    tips = [(t, x) for t, x in zip(time, torque, strict=True) if min(abs(t - time[i]) for i in at) > 0.12]
+    return tuple(np.array(sorted(knots + tips)).T)
