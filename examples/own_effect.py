@@ -20,10 +20,6 @@ SEATED = (0.02, 0.05, 0.12)
 class LoosePlate(PathEffect):
     """A plate that yields under one sign of the torque only and then seats."""
 
-    def trace(self, context):
-        """A third of the angle noise."""
-        return 0.3 * context.angle_noise
-
     def present(self, context):
         """Two per cent of the angle scale."""
         return 0.02

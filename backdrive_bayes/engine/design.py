@@ -61,6 +61,10 @@ class Design:
         """Names of the groups in order."""
         return tuple(g.name for g in self.groups)
 
+    def group(self, name: str) -> Group:
+        """A group by name."""
+        return self.groups[self.names.index(name)]
+
     @property
     def index(self) -> np.ndarray:
         """Number of the group of every weight."""

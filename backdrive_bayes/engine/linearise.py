@@ -22,6 +22,7 @@ from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
+from backdrive_bayes.engine.traces import trace_level
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
@@ -196,9 +197,9 @@ class _Search:
     def _solve(self, reducer, design, angles, covariances, known, idle=frozenset()):
         """Whitened data, log scales and weights; ``known`` log scales by name are where the search begins."""
         priors = class_priors(reducer)
-        for effect in self.effects:
+        for effect in (e for e in self.effects if e.name in design.names):
             free = self._acts(effect) and effect.name not in idle
-            level = effect.present(self.reduced.context) if free else effect.trace(self.reduced.context)
+            level = effect.present(self.reduced.context) if free else trace_level(self.reduced, design, effect)
             priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)
@@ -231,10 +232,10 @@ def _shift(design, distortion, effects, context):
     found = [0.0] * len(design.groups[0].columns)
     for effect in effects:
         if isinstance(effect, TangentEffect) and effect.name in design.names:
-            group = design.groups[design.names.index(effect.name)]
+            group = design.group(effect.name)
             found = [f + c[:, 0] * getattr(distortion, effect.parameter) for f, c in zip(found, group.columns, strict=True)]
         if effect is BENCH_HYSTERESIS:
-            group = design.groups[design.names.index(effect.name)]
+            group = design.group(effect.name)
             found = [f - c[:, 0] * BENCH_HYSTERESIS.usual(context) for f, c in zip(found, group.columns, strict=True)]
     return found
 

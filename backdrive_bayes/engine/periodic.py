@@ -14,8 +14,6 @@ FREQUENCIES = np.arange(0.25, 50.0, 0.125)
 """Waves in one angle scale, from half a wave over the whole range; the spacing is a quarter of a wave over the range."""
 WAVE, AMPLITUDE = "wave", 6e-3
 """Name of the wave's columns in a linear model, and a wave's usual amplitude in shares of the angle scale."""
-TRACE = 0.3
-"""Amplitude of a wave that every bench has, in its angle noise: that of other traces."""
 MOST_PHASES = 5
 """Records up to which each may have a phase of its own: the search of more would take minutes."""
 SAME_ZERO = 0.1

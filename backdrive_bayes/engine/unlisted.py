@@ -23,18 +23,18 @@ def module_group(linear: Linear) -> Group:
         found = []
         for module in modules:
             names = [p.name for p in linear.reducer.parts if p.module == module]
-            part = sum(linear.design.groups[linear.design.names.index(n)].of_record(r) @ weights[n] for n in names)
+            part = sum(linear.design.group(n).of_record(r) @ weights[n] for n in names)
             found += [part, part * time]
         columns.append(np.stack(found, axis=1))
     return Group("module_change", tuple(columns), own=True)
 
 
 def step_group(linear: Linear) -> Group:
-    """The angle after each of many instants, with weights of each record."""
+    """The angle after each of many instants between blocks that count, with weights of each record."""
     columns = []
-    for blocks in linear.reduced.blocks:
-        number = np.arange(blocks.count.size)
-        columns.append((number[:, None] >= number[EVERY:-EVERY:EVERY]).astype(float))
+    for settled in linear.reduced.settled:
+        instants = np.flatnonzero(settled)[EVERY:-EVERY:EVERY]
+        columns.append((np.arange(settled.size)[:, None] >= instants).astype(float))
     return Group("step", tuple(columns), own=True)
 
 

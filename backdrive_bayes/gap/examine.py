@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import expit
 
-from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.levels import OFF, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.gap import probabilities, where
@@ -99,9 +99,10 @@ class Found:
 
     @cached_property
     def fits(self) -> tuple[Fitted, Fitted]:
-        """The class without and with the named effects; a process of each leg's own fits what is held out by itself, so that
-        something unknown closes nothing."""
-        return self.fitted(()), self.fitted(tuple(e for e in self.named if e != "unknown"))
+        """The class without the named effects, not even as traces, and with them; a process of each leg's own fits what is held
+        out by itself, so that something unknown closes nothing."""
+        named = tuple(e for e in self.named if e != "unknown")
+        return self.fitted((), named), self.fitted(named)
 
     @cached_property
     def held_out(self) -> Shrink:
@@ -149,15 +150,16 @@ class Found:
             found[name] = found.get(name, 0.0) + p
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
-    def fitted(self, effects) -> Fitted:
-        """A hypothesis in the linear model; what has no columns of its own stands for itself by those of the class."""
+    def fitted(self, effects, off: tuple[str, ...] = ()) -> Fitted:
+        """A hypothesis in the linear model, with what is ``off`` not even a trace; what has no columns of its own stands for
+        itself by those of the class."""
         linear = with_columns(self.weighed, effects)
-        priors = levels(linear, tuple(effects))
+        priors = levels(linear, tuple(effects), off)
         for module in self.withheld:
             if module not in effects:
                 for part in linear.reducer.parts:
                     if part.module == module:
-                        priors[part.name] = (-14.0, 0.0)
+                        priors[part.name] = OFF
         return fit_hypothesis(linear, effects, priors)
 
     def closed_of(self, folds=None) -> dict | None:

@@ -14,9 +14,9 @@ from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
-from backdrive_bayes.engine.periodic import AMPLITUDE, TRACE, coarse_bank, fine_bank, log_prior, phases, wave_group, with_wave
+from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group, with_wave
 from backdrive_bayes.engine.reduced import disturbance
-from backdrive_bayes.engine.traces import trace_of, usual_of
+from backdrive_bayes.engine.traces import trace_level, usual_of, wave_trace
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
 from backdrive_bayes.mechanics.effect import TangentEffect
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
@@ -130,7 +130,8 @@ class _Table:
         contrasts = self.contrasts
         effects = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}
         self.names = contrasts.names
-        self.trace = np.array([trace_of(linear, effects[n]) if n in effects else 0.0 for n in self.names])
+        design = linear.design.joined(unlisted[0])
+        self.trace = np.array([trace_level(linear.reduced, design, effects[n]) if n in effects else 0.0 for n in self.names])
         usual = {n: usual_of(linear, e) for n, e in effects.items()} | {"module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
@@ -140,7 +141,7 @@ class _Table:
         # What teeth leave in the block means, without and with an encoder's wave beside.
         self.jumping = {False: _traces(jumps), True: _traces(jumps)}
         self.line = line
-        self.trace_wave = TRACE * linear.reduced.context.angle_noise / AMPLITUDE
+        self.trace_wave = wave_trace(linear) / AMPLITUDE
         self.frequency: dict[tuple[str, ...], float] = {}
         self.price: dict[tuple[str, ...], float] = {}
         self.singles: dict[tuple[str, ...], float] = {}

@@ -37,7 +37,7 @@ def _of_terms(weighed, posterior, effect, level):
             rows[term.parameter] = interval(weights[:, 0] * factor, level) | {"unit": term.unit}
         elif isinstance(term, PathEffect):
             design = weighed.of(posterior.hypothesis).design
-            group = design.groups[design.names.index(term.name)]
+            group = design.group(term.name)
             columns = np.vstack([group.of_record(r) for r in range(len(group.columns))])
             columns = columns - columns.mean(axis=0)
             size = np.sqrt(np.mean((weights @ columns.T) ** 2, axis=1)) * context.angle_scale_rad

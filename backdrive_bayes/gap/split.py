@@ -64,9 +64,9 @@ class Split:
 
     @cached_property
     def fits(self) -> tuple[Fitted, Fitted]:
-        """The unit's class with the shared effects, and with those that the simulator lacks beside."""
+        """The unit's class with the shared effects and not a trace of those that the simulator lacks, and with these beside."""
         more = tuple(sorted({*self.shared, *self.lacking} - {"unknown"}))
-        before = _fitted(self.weighed, self.shared)
+        before = _fitted(self.weighed, self.shared, self.lacking)
         return before, before if set(more) == set(self.shared) else _fitted(self.weighed, more)
 
     @cached_property
@@ -128,6 +128,6 @@ class Split:
         return found
 
 
-def _fitted(weighed: Weighed, effects: tuple[str, ...]) -> Fitted:
+def _fitted(weighed: Weighed, effects: tuple[str, ...], off: tuple[str, ...] = ()) -> Fitted:
     linear = with_columns(weighed, effects)
-    return fit_hypothesis(linear, effects, levels(linear, effects))
+    return fit_hypothesis(linear, effects, levels(linear, effects, off))

@@ -45,8 +45,8 @@ class Effect:
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
     channel, ``per_record``
-    says whether each record has weights of its own. ``trace`` and ``present`` give the standard deviation of its (independent)
-    weights where it is a mere trace, as on every bench, and where it acts.
+    says whether each record has weights of its own. ``present`` gives the standard deviation of its (independent) weights where
+    it acts; where it is a mere trace, as on every bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
 
     name: str
@@ -56,10 +56,6 @@ class Effect:
     unit: str = "1"
     of_reducer: bool = True
     per_record: bool = False
-
-    def trace(self, context: Context) -> float:
-        """Standard deviation of the weights at trace level."""
-        raise NotImplementedError
 
     def present(self, context: Context) -> float:
         """Typical standard deviation of the weights where the effect acts."""

@@ -151,15 +151,20 @@ def _friction(thresholds) -> Part:
 
 
 def _clearance(knots) -> Part:
-    width = np.diff(knots)
-    cells = Cells(knots[:-1], -knots[1:], width, 2 * width)
+    cells = Cells(knots[:-1], -knots[1:], np.diff(knots), 2 * _steps(knots))
     return Part("clearance", "geometric", cells, _neighbouring(knots), (float(np.log(0.02)), 1.5))
 
 
 def _free_play(knots) -> Part:
-    width = np.diff(knots)
-    cells = Cells(knots[:-1], knots[:-1], width, width)
+    cells = Cells(knots[:-1], knots[:-1], np.diff(knots), _steps(knots))
     return Part("free_play", "geometric", cells, _neighbouring(knots), (float(np.log(0.003)), 1.0))
+
+
+def _steps(knots) -> np.ndarray:
+    """Torques over which a weight's angle is turned, (cells,): what is turned beyond the largest torque is not seen, or the
+    loops would bend at their tips."""
+    width = np.diff(knots)
+    return np.r_[width[:-1], max(1.0 - knots[-2], width[-2])]
 
 
 def _neighbouring(knots) -> np.ndarray:
@@ -184,8 +189,8 @@ def place_knots(torques, most: int, least: float) -> np.ndarray:
 
     Blocks are short where the angle moves fast, so the knots are dense where the loops are steep; next to zero they are denser.
     """
-    wanted = np.quantile(np.abs(torques), np.linspace(0.0, 1.0, most + 1))
-    knots = spaced(np.r_[0.0, wanted[1:], TOP], least)
+    wanted = np.quantile(np.abs(torques), np.linspace(0.0, 1.0, most + 1)[1:-3])
+    knots = spaced(np.r_[0.0, wanted, TOP], least)
     halved = knots[1] * 0.5 ** np.arange(HALVINGS, 0, -1)
     return np.r_[0.0, halved[halved >= least], knots[1:]]
 

@@ -10,7 +10,7 @@ from backdrive_bayes.records.record import Record
 from backdrive_bayes.records.shape import turning_levels
 
 _FULL = 0.9  # of the longest ramp: shorter ones are minor loops or the first loading
-_CLOSED = 0.02  # of a ramp, between the torques at which a cycle begins and ends: a ramp cut short by the record's end is no cycle
+_CLOSED = 0.02  # of a ramp, between the first and the last torque of a cycle: a ramp that the record cuts short closes none
 _AT_REST = 0.15  # of the amplitude: what begins and ends this near zero torque is a first cycle
 _TIP_SHARES = (0.025, 0.05, 0.1)  # of a full ramp's samples, next to a tip
 _ZERO_SHARE = 0.0025  # of a full ramp's samples, on either side of zero torque: branches bend within a percent of T

@@ -54,7 +54,7 @@ NUMBERS = {
     "usual_line": f"{lines.USUAL:g}",
     "highest_line": f"{lines.HIGHEST:g}",
     "above": f"{traces.ABOVE:g}",
-    "trace_height": f"{traces.HEIGHT:g}",
+    "trace": f"{traces.TRACE:g}",
 }
 """Constants of the code that the pages name."""
 _LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]+\)")

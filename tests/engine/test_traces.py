@@ -1,15 +1,17 @@
 """How large effects may be as traces and where they act."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.planted import planted
 
-from backdrive_bayes.engine.infer import prepare
-from backdrive_bayes.engine.traces import ABOVE, HEIGHT, trace_of, usual_of
-from backdrive_bayes.mechanics.effect import GrowthEffect
+from backdrive_bayes.engine.infer import library_terms, prepare
+from backdrive_bayes.engine.linearise import linearise
+from backdrive_bayes.engine.periodic import wave_group
+from backdrive_bayes.engine.reduced import reduce_unit
+from backdrive_bayes.engine.traces import ABOVE, TRACE, sample_noise, trace_level, trace_of, usual_of, wave_trace
+from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 
 
 @pytest.fixture(scope="module")
@@ -17,27 +19,54 @@ def linear():
     return prepare(planted(3, loops=((0.1, 0.1), (0.1, 0.01))))[0]
 
 
-def moved(linear, effect):
-    """Largest move of the angle by a trace, in standard deviations of the noise."""
-    group = linear.design.groups[linear.design.names.index(effect.name)]
-    found = []
-    for column, slope, noise in zip(group.columns, linear.reduced.slopes(linear.predicted), linear.reduced.noise, strict=True):
-        sd = np.hypot(noise.correlated_rad, slope * noise.torque_nm) / linear.reduced.angle_scale_rad
-        found.append(np.abs(column).max(axis=1) / sd)
-    return trace_of(linear, effect) * np.max(np.concatenate(found))
+def moved(linear, group, level):
+    """Root mean square move of the angle by weights of that standard deviation, in standard deviations of a sample's noise."""
+    columns = np.concatenate([group.of_record(r)[s] for r, s in enumerate(linear.reduced.settled)])
+    starts = np.cumsum([0, *(s.sum() for s in linear.reduced.settled)])
+    each = zip(sample_noise(linear.reduced, linear.design), linear.reduced.settled, strict=True)
+    noise = np.concatenate([n[s] for n, s in each])
+    for a, b in zip(starts[:-1], starts[1:], strict=True):
+        columns[a:b] -= np.average(columns[a:b], axis=0, weights=noise[a:b] ** -2.0)
+    weights = level * np.random.default_rng(1).normal(size=(columns.shape[1], 4000))
+    return float(np.sqrt(np.mean((columns @ weights / noise[:, None]) ** 2)))
 
 
-def test_a_trace_of_a_law_of_the_rate_moves_the_angle_by_a_part_of_its_noise(linear):
+def test_every_trace_moves_the_angle_by_the_same_part_of_its_noise(linear):
+    told = []
     for effect in linear.effects:
-        if isinstance(effect, GrowthEffect) and trace_of(linear, effect) > effect.trace(linear.reduced.context):
-            assert HEIGHT <= moved(linear, effect) < 5 * HEIGHT, effect.name
+        if effect is BENCH_HYSTERESIS or effect.name not in linear.design.names:
+            continue
+        group = linear.design.group(effect.name)
+        size, level = moved(linear, group, trace_of(linear, effect)), trace_of(linear, effect)
+        assert size < 1.1 * TRACE and level <= effect.present(linear.reduced.context) * (1 + 1e-9), effect.name
+        told += [effect.name] if level < 0.99 * effect.present(linear.reduced.context) else []
+        assert level > 0.99 * effect.present(linear.reduced.context) or size == pytest.approx(TRACE, rel=0.1), effect.name
+    assert {"torque_offset", "thermal_drift", "viscoelastic_creep", "asymmetric_stiffness", "friction_rate"} <= set(told)
+
+
+def test_so_does_the_trace_of_a_wave(linear):
+    assert moved(linear, wave_group(linear, 9.0), wave_trace(linear)) == pytest.approx(TRACE, rel=0.1)
 
 
 def test_what_acts_is_well_above_a_trace(linear):
     for effect in linear.effects:
-        assert usual_of(linear, effect) >= ABOVE * trace_of(linear, effect)
-    faint = next(e for e in linear.effects if e.name == "torque_offset")
-    context = dataclasses.replace(linear.reduced.context, torque_noise=0.1)
-    noisy = SimpleNamespace(reduced=SimpleNamespace(context=context))
-    assert faint.trace(context) > faint.present(context), "the offset's own size says less than the noise of the torque"
-    assert usual_of(noisy, faint) == pytest.approx(ABOVE * faint.trace(context))
+        if effect is not BENCH_HYSTERESIS:
+            assert usual_of(linear, effect) >= ABOVE * trace_of(linear, effect)
+
+
+def test_traces_follow_the_noise(linear):
+    """Twice the noise hides twice as much."""
+    reduced = linear.reduced
+    twice = tuple(
+        dataclasses.replace(n, white_rad=2 * n.white_rad, correlated_rad=2 * n.correlated_rad, torque_nm=2 * n.torque_nm)
+        for n in reduced.noise
+    )
+    louder = dataclasses.replace(reduced, noise=twice)
+    effect = next(e for e in linear.effects if e.name == "thermal_drift")
+    assert trace_level(louder, linear.design, effect) == pytest.approx(2 * trace_level(reduced, linear.design, effect), rel=0.02)
+
+
+def test_what_has_no_columns_leaves_no_trace():
+    one_rate = linearise(reduce_unit(planted(3, loops=((0.1, 0.1),))), library_terms())[0]
+    law = next(e for e in one_rate.effects if e.name == "friction_rate")
+    assert trace_of(one_rate, law) == 0.0

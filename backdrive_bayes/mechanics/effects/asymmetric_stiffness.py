@@ -15,10 +15,6 @@ SMOOTH = 1.5
 class AsymmetricStiffness(PathEffect):
     """An angle that is even in the torque, or in the torque behind friction, smooth in the root of its size."""
 
-    def trace(self, context):
-        """A third of the angle noise over the whole range."""
-        return 0.3 * context.angle_noise
-
     def present(self, context):
         """Two per cent of the angle scale."""
         return 0.02
@@ -44,10 +40,6 @@ ASYMMETRIC_STIFFNESS = AsymmetricStiffness(
 
 class UnequalFlanks(FlankEffect):
     """Elasticity, friction and clearance each differ between the flanks by a share of themselves."""
-
-    def trace(self, context):
-        """A fifth of a per cent."""
-        return 2e-3
 
     def present(self, context):
         """Five per cent."""

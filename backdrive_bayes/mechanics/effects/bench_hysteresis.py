@@ -18,13 +18,9 @@ class BenchHysteresis(Effect):
         """Mean of the prior."""
         return float(SIZE * np.sqrt(2.0 / np.pi)) * context.torque_noise
 
-    def trace(self, context):
+    def present(self, context):
         """Standard deviation of the prior."""
         return float(SIZE * np.sqrt(1.0 - 2.0 / np.pi)) * context.torque_noise
-
-    def present(self, context):
-        """As a trace: it is never an answer."""
-        return self.trace(context)
 
 
 BENCH_HYSTERESIS = BenchHysteresis(

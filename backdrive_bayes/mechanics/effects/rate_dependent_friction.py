@@ -8,10 +8,6 @@ SOURCE = "Stribeck's law over a narrow range of rates; Armstrong-Hélouvry et al
 class RateExponent(GrowthEffect):
     """Thresholds follow a power of the loading rate."""
 
-    def trace(self, context):
-        """Less than a half per cent for a factor e of the rate."""
-        return 4e-3
-
     def present(self, context):
         """Some per cent for a factor e of the rate."""
         return 0.05
@@ -19,10 +15,6 @@ class RateExponent(GrowthEffect):
 
 class RateBend(GrowthEffect):
     """The exponent itself changes with the rate."""
-
-    def trace(self, context):
-        """A quarter of the exponent's."""
-        return 1e-3
 
     def present(self, context):
         """A third of the exponent's."""

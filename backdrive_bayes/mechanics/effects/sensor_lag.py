@@ -8,10 +8,6 @@ class SensorLag(TangentEffect):
 
     one_way = True
 
-    def trace(self, context):
-        """The torque moves by half of its noise."""
-        return 0.5 * context.torque_noise / context.rate.max()
-
     def present(self, context):
         """The torque moves by some thousandths of the largest at the fastest rate."""
         return 6e-3 / context.rate.max()
@@ -31,10 +27,6 @@ SENSOR_LAG = SensorLag(
 
 class LagSpread(SpreadEffect):
     """How much of the lag is a first-order one: 0 for a pure delay, 1 where all of it smooths."""
-
-    def trace(self, context):
-        """A small part."""
-        return 0.1
 
     def present(self, context):
         """Half of it."""

@@ -11,10 +11,6 @@ ORDERS = 5
 class ThermalDrift(PathEffect):
     """Legendre polynomials of the time within a record, higher orders smaller."""
 
-    def trace(self, context):
-        """A small part of the angle noise."""
-        return 0.15 * context.angle_noise
-
     def present(self, context):
         """A per cent of the angle scale."""
         return 0.01

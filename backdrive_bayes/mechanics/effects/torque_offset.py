@@ -6,10 +6,6 @@ from backdrive_bayes.mechanics.effect import TangentEffect
 class TorqueOffset(TangentEffect):
     """The loop is shifted along the torque."""
 
-    def trace(self, context):
-        """Less than half of the torque noise of a sample."""
-        return 0.4 * context.torque_noise
-
     def present(self, context):
         """Some thousandths of the largest torque."""
         return 6e-3

@@ -13,10 +13,6 @@ ROUNDING = 1e-9
 class Unexplained(PathEffect):
     """Hat functions along each monotone leg, independent between legs."""
 
-    def trace(self, context):
-        """A hundredth of the angle noise."""
-        return 0.01 * context.angle_noise
-
     def present(self, context):
         """Six thousandths of the angle scale."""
         return 6e-3

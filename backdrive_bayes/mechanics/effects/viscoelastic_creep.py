@@ -16,10 +16,6 @@ class ViscoelasticCreep(PathEffect):
     """Kelvin-Voigt elements over a range of time constants, driven by the torque, by the torque behind friction and, as creep
     that grows faster than the load (Schapery, Polym. Eng. Sci. 9, 1969), by its square."""
 
-    def trace(self, context):
-        """A third of the angle noise."""
-        return 0.3 * context.angle_noise
-
     def present(self, context):
         """Three per cent of the angle scale."""
         return 0.03
