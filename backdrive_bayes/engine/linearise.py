@@ -142,7 +142,7 @@ class _Search:
         reduced, context = self.reduced, self.reduced.context
         jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
         learnings = LEARNINGS if refine else 0
-        covariances = reduced.covariances(reduced.slopes(reduced.angles, 2.0), jitter)
+        covariances = reduced.covariances(reduced.read_slopes, jitter)
         laid, weights, refined = None, None, 0
         known: dict[str, float] = {}
         idle: set[str] = set()

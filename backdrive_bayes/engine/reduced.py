@@ -86,6 +86,11 @@ class BlockMeans:
             max(float(np.median(torque)) / self.torque_scale_nm, 1e-5),
         )
 
+    @cached_property
+    def read_slopes(self) -> list[np.ndarray]:
+        """Slopes of the angle as read, over twice the torque noise: before anything is predicted."""
+        return self.slopes(self.angles, 2.0)
+
     @property
     def scale_dof(self) -> float:
         """Weight of the noise estimate in chi-square degrees of freedom."""

@@ -12,8 +12,9 @@ from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import Effect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.effects.torque_offset import TORQUE_OFFSET
 
+OFFSET = "torque_offset"
+"""Its columns are the slope of the loop."""
 TRACE = 0.1
 """Root mean square by which a trace of an effect moves the angle, in standard deviations of a sample's noise."""
 ABOVE = 10.0
@@ -40,21 +41,21 @@ def trace_of(linear: Linear, effect: Effect) -> float:
 
 
 def wave_trace(linear: Linear) -> float:
-    """Amplitude of a wave at trace level, in shares of the angle scale."""
+    """Standard deviation of a wave's sine and cosine at trace level, in shares of the angle scale."""
     each = zip(sample_noise(linear.reduced, linear.design), linear.reduced.settled, strict=True)
     inverse = np.concatenate([noise[own] ** -2.0 for noise, own in each])
-    return float(TRACE * np.sqrt(2.0 / inverse.mean()))
+    return float(TRACE / np.sqrt(inverse.mean()))
 
 
 def sample_noise(reduced: Reduced, design: Design) -> list[np.ndarray]:
     """Standard deviation of a single sample's noise, of the angle and of the torque, at each block in shares of the angle scale,
     (blocks,) by record; the torque's acts by the slope of the loop, which is what an offset of the torque moves."""
-    slopes = reduced.slopes(reduced.angles, 2.0)
     found = []
-    for record, (slope, noise) in enumerate(zip(slopes, reduced.noise, strict=True)):
-        moved = slope * noise.torque_nm / reduced.angle_scale_rad
-        if TORQUE_OFFSET.name in design.names:
-            moved = np.abs(design.group(TORQUE_OFFSET.name).columns[record][:, 0]) * noise.torque_nm / reduced.torque_scale_nm
+    for record, noise in enumerate(reduced.noise):
+        if OFFSET in design.names:
+            moved = np.abs(design.group(OFFSET).columns[record][:, 0]) * noise.torque_nm / reduced.torque_scale_nm
+        else:
+            moved = reduced.read_slopes[record] * noise.torque_nm / reduced.angle_scale_rad
         found.append(np.hypot(moved, np.hypot(noise.white_rad, noise.correlated_rad) / reduced.angle_scale_rad))
     return found
 

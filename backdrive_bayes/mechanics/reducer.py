@@ -164,7 +164,7 @@ def _steps(knots) -> np.ndarray:
     """Torques over which a weight's angle is turned, (cells,): what is turned beyond the largest torque is not seen, or the
     loops would bend at their tips."""
     width = np.diff(knots)
-    return np.r_[width[:-1], max(1.0 - knots[-2], width[-2])]
+    return np.r_[width[:-1], np.max(np.r_[1.0 - knots[-2], width[-2:-1]])]
 
 
 def _neighbouring(knots) -> np.ndarray:

@@ -225,6 +225,5 @@ def test_an_effect_of_ones_own_comes_by_entry_point(monkeypatch, fresh_registry)
 
 def test_an_effect_without_levels_is_abstract():
     bare = Effect("bare", "oddness", "none", "nobody")
-    for method in (bare.trace, bare.present):
-        with pytest.raises(NotImplementedError):
-            method(CONTEXT)
+    with pytest.raises(NotImplementedError):
+        bare.present(CONTEXT)

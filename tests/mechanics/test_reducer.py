@@ -176,3 +176,17 @@ def width_error_at_zero(knots):
 def test_spaced_keeps_both_ends():
     found = spaced(np.array([0.0, 0.001, 0.1, 0.15, 0.2, 1.2]), 0.08)
     np.testing.assert_allclose(found, [0.0, 0.1, 0.2, 1.2])
+
+
+def test_loops_do_not_bend_at_their_tips():
+    """What is turned per torque above the last knot is what is turned below it (planted fault: a step that reaches to TOP)."""
+    knots = place_knots(np.linspace(0.0, 0.99, 400), 60, 1e-4)
+    reducer = ReducerClass(knots)
+    time = np.linspace(0.0, 5.0, 2001)
+    history = through(time, np.interp(time, [0, 1, 2, 3, 4, 5], [0, 1, -1, 1, -1, 1.0]), 1.0)
+    cells = reducer.part("free_play").cells
+    turned = cells.ends(history)[-401:] @ np.diff(np.minimum(knots, 1.0))
+    slope = np.diff(turned) / np.diff(history.z1[-401:])
+    top = history.z1[-400:] > knots[-2]
+    assert knots[-2] < 0.97 and slope[top].mean() == pytest.approx(slope[(history.z1[-400:] > 0.5) & ~top].mean(), rel=0.05)
+    assert (cells.norm[-1] / cells.width[-1]) == pytest.approx((1.0 - knots[-2]) / (TOP - knots[-2]))
