@@ -29,6 +29,8 @@ from backdrive_bayes.results import VERDICT
 
 BINS = 60
 FEWEST_UNITS = 3
+ENERGIES = ("loop_area_J", "absorbed_J")
+"""Indicators that are integrals of the angle over the torque."""
 _EXPLAIN = "Fit with the effects that the diagnosis names, or give their models with --model."
 
 
@@ -60,7 +62,8 @@ def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
     """
     structure = weigh(evidences, probabilities)
     judged = [j for limit in limits.limits for j in _judge(structure, limit, limits)]
-    together = Risks(structure.average(_together(structure, judged)), structure.unknown)
+    within = min((_within(structure, j) for j in judged), default=1.0)
+    together = Risks(structure.average(_together(structure, judged)), structure.unknown, within)
     verdict, reason = _verdict(structure, together, limits)
     rows = [_row(structure, j, limits, batch) for j in judged]
     limiting = min(range(len(rows)), key=lambda i: (round(rows[i]["conformance_probability"], 4), _margin(rows[i])))
@@ -126,6 +129,21 @@ def _together(structure, judged) -> list[float]:
     return [share(np.logical_and.reduce([j.inside[i] for j in judged])) for i in range(len(structure.models))]
 
 
+def _within(structure: Structure, judged: Judged) -> float:
+    """Largest probability that a limit is kept where something acts that no model holds.
+
+    Whatever acts, it was measured: an angle that differs from a model's by the gap, with root mean square g over the torque,
+    encloses at most 4 T g more or less in a loop of amplitude T (Cauchy-Schwarz), and g in one of R records is at most √R times
+    that of all. Other indicators, and loops that were not measured, may be anything.
+    """
+    gap = (structure.models[0].evidence.diagnosis or {}).get("gap") or {}
+    if judged.loop.predicted or judged.limit.indicator not in ENERGIES or not gap.get("rms_rad"):
+        return 1.0
+    records = len(structure.models[0].evidence.about["records"])
+    worth = 4.0 * judged.loop.amplitude * gap["rms_rad"] * np.sqrt(records)
+    return max(conformance_probability(v, judged.limit.lo - worth, judged.limit.hi + worth) for v in judged.values)
+
+
 def _verdict(structure: Structure, risks: Risks, limits: Limits) -> tuple[Verdict, str]:
     bad = [m.evidence for m in structure.models if not m.evidence.converged]
     if bad:
@@ -156,7 +174,7 @@ def _row(structure: Structure, judged: Judged, limits: Limits, batch) -> dict:
     mixed = _mixture(structure, judged.values)
     level = first.about["level"]
     low, median, high = (float(q) for q in np.quantile(mixed, [0.5 - level / 2, 0.5, 0.5 + level / 2]))
-    risks = Risks(structure.average(judged.conformance), structure.unknown)
+    risks = Risks(structure.average(judged.conformance), structure.unknown, _within(structure, judged))
     effective = min(float(np.size(judged.values[0])), first.about["convergence"]["min_tail_ess"] or 1.0)
     upper, lower = guard_bands(mixed, limits.consumer)
     row = {

@@ -29,10 +29,14 @@ class Verdict(enum.Enum):
 
 @dataclass(frozen=True)
 class Risks:
-    """Specific risks of a decision about this unit; what no model covers (``unknown``) counts against either decision."""
+    """Specific risks of a decision about this unit; what no model covers (``unknown``) counts against either decision.
+
+    ``within`` is the largest probability that limits are kept where something unknown acts.
+    """
 
     conformance: float
     unknown: float = 0.0
+    within: float = 1.0
 
     @property
     def consumer(self) -> float:
@@ -42,7 +46,7 @@ class Risks:
     @property
     def producer(self) -> float:
         """Probability that the unit is within limits, should it be rejected."""
-        return min(1.0, self.conformance + self.unknown)
+        return min(1.0, self.conformance + self.within * self.unknown)
 
     def verdict(self, consumer: float, producer: float) -> Verdict:
         """Accepted or rejected where the risk of doing so is at most the agreed one, else inconclusive."""

@@ -23,7 +23,8 @@ _RULE = (
     "An accepted unit has the specific consumer's risk 1 − p_c of being out of limits, a rejected one the specific "
     "producer's risk p_c of being within. The unit is accepted where the first risk, for all limits together, is at most the "
     "agreed one, rejected where the second is, and otherwise the verdict is inconclusive. The guard band (clause 8.3) is how "
-    "far the median must stay from a limit for that. What no model at hand holds counts against both decisions."
+    "far the median must stay from a limit for that. What no model at hand holds counts against both decisions, but where the "
+    "measured loop itself breaks an energy's limit by more than the gap can enclose."
 )
 _GLOBAL = (
     "Global risks (clause 9.5) hold for units of the process that are measured and judged like this one: consumer's, out of "

@@ -209,3 +209,16 @@ def test_the_naive_decision_stands_beside():
     row = judge(area(3))["limits"][0]
     assert row["naive"] == {"value": 3.0e-4, "inside": True}
     assert judge(Limit("peak_angle_rad", hi=1.0, where="w"))["limits"][0]["naive"]["value"] is None
+
+
+def test_an_unknown_cause_moves_an_energy_no_further_than_the_gap_that_it_leaves():
+    """Out of limits by more than the gap can enclose is rejected, whatever the cause; by less, or of a peak, it is open."""
+    found, unit = diagnosis(["unknown"], unknown=0.9, none=0.1), evidence()
+    loop, records = unit.largest()[0], len(unit.about["records"])
+    worth = 10 * SD / (4 * loop.amplitude * np.sqrt(records))
+    small, large = (evidence(diagnosis=found | {"gap": {"rms_rad": worth * f}}) for f in (1.0, 4.0))
+    assert judge(area(-30), e=small)["verdict"] == "rejected" and judge(area(-30), e=large)["verdict"] == "inconclusive"
+    assert judge(area(30), e=small)["verdict"] == "inconclusive", "a gap of unknown cause accepts nothing"
+    peak = Limit("peak_angle_rad", hi=0.5 * TYPICAL["peak_angle_rad"], rate=0.05, where="w")
+    assert judge(peak, e=small)["verdict"] == "inconclusive"
+    assert judge(peak, area(-30), e=small)["verdict"] == "rejected", "one limit that is surely broken is enough"
