@@ -42,8 +42,8 @@ too far apart for amplitudes that differ, that a record which begins at a tip wa
 called unknown, that tips of a torque by hand were misplaced, that a torque in stairs was called stick-slip and a body that
 softens a slip. All this was mended before the run shown here, so neither is unseen any more. `fourth-outside`:
 `studies/fourth_outside_bench.py --units 80 --seed 31`, written likewise and run whole before it was looked at: exact 0.51, clean
-called none 0.54, unlisted called unknown 0.80, pairs 0.30, sets cover 0.71, log score -2.36. That run showed that bits of a leg at
-a record's end bent the torque's path and that traces were smaller than the bench's; its row here is of the code after that was
+called none 0.54, unlisted called unknown 0.80, pairs 0.30, sets cover 0.71, log score -2.36. That run showed that bits of a leg
+at a record's end bent the torque's path and that traces were smaller than the bench's; its row here is of the code after that was
 mended. The rows of all others were weighed before that, before the torque's path was made of lines and before an encoder's wave
 had a phase of its own in records of other zeros."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]

@@ -50,12 +50,13 @@ as many independent units. `outside`, `second-outside`, `third-outside` and `fou
 `studies/second_outside_bench.py`, `studies/third_outside_bench.py` and `studies/fourth_outside_bench.py`, each written without
 sight of the package; what their first runs showed was mended (they held .70, .86, .71, .84 at 90 % then), so that they are no
 longer unseen. On the fourth, records that end with a bit of a leg bent the torque's path, ramps that a record cuts short were
-taken for whole ones (ten of 24 units "contradicted" their measured cycle), traces were smaller than the bench's, and loops bent at
-their tips. In the last three, amplitudes differ from record to record and the truth is that of the rated torque. The row of the
-fourth is of the present code, those of the three others of the code before that, the rest of a class and a torque path earlier
-still. Seven laws make the third, of which three (Duhem's and Dahl's, over half of its units) have no return-point memory and are
-not of the class; its truth is the loop without the reducer's own traces (slip, creep, a second clearance), which move the peak by
-0.03 to 0.25 % and S by 0.5 to 4 %, more than the intervals are wide: an interval about the loop as measured misses it.
+taken for whole ones (ten of 24 units "contradicted" their measured cycle), traces were smaller than the bench's, and loops
+bent at their tips. In the last three, amplitudes differ from record to record and the truth is that of the rated torque. The
+row of the fourth is of the present code, those of the three others of the code before that, the rest of a class and a torque
+path earlier still. Seven laws make the third, of which three (Duhem's and Dahl's, over half of its units) have no return-
+point memory and are not of the class; its truth is the loop without the reducer's own traces (slip, creep, a second
+clearance), which move the peak by 0.03 to 0.25 % and S by 0.5 to 4 %, more than the intervals are wide: an interval about the
+loop as measured misses it.
 """
 
 

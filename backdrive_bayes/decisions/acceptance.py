@@ -62,10 +62,10 @@ def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
     """
     structure = weigh(evidences, probabilities)
     judged = [j for limit in limits.limits for j in _judge(structure, limit, limits)]
-    within = min((_within(structure, j) for j in judged), default=1.0)
-    together = Risks(structure.average(_together(structure, judged)), structure.unknown, within)
+    within = [_within(structure, j) for j in judged]
+    together = Risks(structure.average(_together(structure, judged)), structure.unknown, min(within, default=1.0))
     verdict, reason = _verdict(structure, together, limits)
-    rows = [_row(structure, j, limits, batch) for j in judged]
+    rows = [_row(structure, j, w, limits, batch) for j, w in zip(judged, within, strict=True)]
     limiting = min(range(len(rows)), key=lambda i: (round(rows[i]["conformance_probability"], 4), _margin(rows[i])))
     first = structure.models[0].evidence
     return {
@@ -134,9 +134,10 @@ def _within(structure: Structure, judged: Judged) -> float:
 
     Whatever acts, it was measured: an angle that differs from a model's by the gap, with root mean square g over the torque,
     encloses at most 4 T g more or less in a loop of amplitude T (Cauchy-Schwarz), and g in one of R records is at most √R times
-    that of all. Other indicators, and loops that were not measured, may be anything.
+    that of all. Other indicators, loops that were not measured, and what a diagnosis without a verdict leaves, may be anything.
     """
-    gap = (structure.models[0].evidence.diagnosis or {}).get("gap") or {}
+    diagnosis = structure.models[0].evidence.diagnosis or {}
+    gap = {} if diagnosis.get("inconclusive") else diagnosis.get("gap") or {}
     if judged.loop.predicted or judged.limit.indicator not in ENERGIES or not gap.get("rms_rad"):
         return 1.0
     records = len(structure.models[0].evidence.about["records"])
@@ -168,13 +169,13 @@ def _p(probability: float) -> str:
     return f"{100 * probability:.2g} %" if probability < 0.99 else f"{min(100 * probability, 99.9):.1f} %"
 
 
-def _row(structure: Structure, judged: Judged, limits: Limits, batch) -> dict:
+def _row(structure: Structure, judged: Judged, within: float, limits: Limits, batch) -> dict:
     """All numbers of one limit at one loop; medians and intervals are of the mixture of models."""
     limit, loop, first = judged.limit, judged.loop, structure.models[0].evidence
     mixed = _mixture(structure, judged.values)
     level = first.about["level"]
     low, median, high = (float(q) for q in np.quantile(mixed, [0.5 - level / 2, 0.5, 0.5 + level / 2]))
-    risks = Risks(structure.average(judged.conformance), structure.unknown, _within(structure, judged))
+    risks = Risks(structure.average(judged.conformance), structure.unknown, within)
     effective = min(float(np.size(judged.values[0])), first.about["convergence"]["min_tail_ess"] or 1.0)
     upper, lower = guard_bands(mixed, limits.consumer)
     row = {

@@ -6,7 +6,7 @@ import numpy as np
 
 from backdrive_bayes.engine.design import class_priors
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.traces import trace_of, usual_of
+from backdrive_bayes.engine.traces import trace_levels, usual_level
 from backdrive_bayes.mechanics.registry import all_effects
 
 OFF = (-14.0, 0.0)
@@ -20,9 +20,10 @@ def levels(linear: Linear, hypothesis: tuple[str, ...], off: tuple[str, ...] = (
     even a trace, all others are at trace level."""
     priors = class_priors(linear.reducer)
     present, gone = ({t.name for n in names for t in all_effects().get(n, ())} for names in (hypothesis, off))
-    for effect in (e for e in linear.effects if e.name in linear.design.names):
-        on = effect.name in present
-        level = usual_of(linear, effect) if on else trace_of(linear, effect)
+    traces = trace_levels(linear.reduced, linear.design, linear.effects)
+    for effect in (e for e in linear.effects if e.name in traces):
+        on, trace = effect.name in present, traces[effect.name]
+        level = usual_level(effect, linear.reduced.context, trace) if on else trace
         priors[effect.name] = OFF if effect.name in gone else (float(np.log(level)), PRESENT_SD if on else 0.0)
     for name in linear.design.names:
         priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))

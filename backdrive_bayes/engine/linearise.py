@@ -22,7 +22,7 @@ from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.start import possible_starts
-from backdrive_bayes.engine.traces import trace_level
+from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
@@ -197,9 +197,10 @@ class _Search:
     def _solve(self, reducer, design, angles, covariances, known, idle=frozenset()):
         """Whitened data, log scales and weights; ``known`` log scales by name are where the search begins."""
         priors = class_priors(reducer)
-        for effect in (e for e in self.effects if e.name in design.names):
+        traces = trace_levels(self.reduced, design, self.effects)
+        for effect in (e for e in self.effects if e.name in traces):
             free = self._acts(effect) and effect.name not in idle
-            level = effect.present(self.reduced.context) if free else trace_level(self.reduced, design, effect)
+            level = effect.present(self.reduced.context) if free else traces[effect.name]
             priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)

@@ -5,12 +5,14 @@ All traces are measured alike: by how far they move the angle, against the noise
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.reduced import Reduced
-from backdrive_bayes.mechanics.effect import Effect
+from backdrive_bayes.mechanics.effect import Context, Effect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 
 OFFSET = "torque_offset"
@@ -21,23 +23,19 @@ ABOVE = 10.0
 """An effect that acts is usually as many times a trace, or it could not be told from one."""
 
 
-def trace_level(reduced: Reduced, design: Design, effect: Effect) -> float:
-    """Standard deviation of an effect's weights at trace level, no more than where it acts."""
-    present = effect.present(reduced.context)
-    if effect is BENCH_HYSTERESIS:
-        return present
-    group, square, count = design.group(effect.name), 0.0, 0
-    for record, (settled, noise) in enumerate(zip(reduced.settled, sample_noise(reduced, design), strict=True)):
-        columns, noise = group.of_record(record)[settled], noise[settled]
-        columns = columns - np.average(columns, axis=0, weights=noise**-2.0)
-        square += float(np.sum((columns / noise[:, None]) ** 2))
-        count += int(settled.sum())
-    return TRACE / max(np.sqrt(square / count), TRACE / present)
-
-
-def trace_of(linear: Linear, effect: Effect) -> float:
-    """Trace level of an effect's weights in a linear model; what has no columns there leaves none."""
-    return trace_level(linear.reduced, linear.design, effect) if effect.name in linear.design.names else 0.0
+def trace_levels(reduced: Reduced, design: Design, effects: Iterable[Effect]) -> dict[str, float]:
+    """Standard deviations of effects' weights at trace level by name, no more than where they act; what has no columns in the
+    design leaves no trace and is not there."""
+    found, noises = {}, sample_noise(reduced, design)
+    for effect in (e for e in effects if e.name in design.names):
+        group, square, count, present = design.group(effect.name), 0.0, 0, effect.present(reduced.context)
+        for record, (settled, noise) in enumerate(zip(reduced.settled, noises, strict=True)):
+            columns, own = group.of_record(record)[settled], noise[settled]
+            columns = columns - np.average(columns, axis=0, weights=own**-2.0)
+            square += float(np.sum((columns / own[:, None]) ** 2))
+            count += int(settled.sum())
+        found[effect.name] = present if effect is BENCH_HYSTERESIS else TRACE / max(np.sqrt(square / count), TRACE / present)
+    return found
 
 
 def wave_trace(linear: Linear) -> float:
@@ -60,6 +58,6 @@ def sample_noise(reduced: Reduced, design: Design) -> list[np.ndarray]:
     return found
 
 
-def usual_of(linear: Linear, effect: Effect) -> float:
-    """Usual standard deviation of an effect's weights where it acts: its own, or ABOVE traces if that is more."""
-    return max(effect.present(linear.reduced.context), ABOVE * trace_of(linear, effect))
+def usual_level(effect: Effect, context: Context, trace: float) -> float:
+    """Usual standard deviation of an effect's weights where it acts: its own, or ABOVE times its trace if that is more."""
+    return max(effect.present(context), ABOVE * trace)

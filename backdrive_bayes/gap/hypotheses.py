@@ -16,7 +16,7 @@ from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group, with_wave
 from backdrive_bayes.engine.reduced import disturbance
-from backdrive_bayes.engine.traces import trace_level, usual_of, wave_trace
+from backdrive_bayes.engine.traces import trace_levels, usual_level, wave_trace
 from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
 from backdrive_bayes.mechanics.effect import TangentEffect
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
@@ -128,11 +128,12 @@ class _Table:
         self.linear, self.contrasts = linear, make_contrasts(linear, (*effect_groups(linear), *unlisted))
         self.waved = self.contrasts.joined(make_contrasts(linear, (waves,)))
         contrasts = self.contrasts
-        effects = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}
+        effects, context = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}, linear.reduced.context
         self.names = contrasts.names
-        design = linear.design.joined(unlisted[0])
-        self.trace = np.array([trace_level(linear.reduced, design, effects[n]) if n in effects else 0.0 for n in self.names])
-        usual = {n: usual_of(linear, e) for n, e in effects.items()} | {"module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
+        traces = trace_levels(linear.reduced, linear.design.joined(unlisted[0]), effects.values())
+        self.trace = np.array([traces.get(n, 0.0) for n in self.names])
+        usual = {e.name: usual_level(e, context, traces.get(e.name, 0.0)) for e in linear.effects}
+        usual |= {UNEXPLAINED: UNKNOWN.present(context), "module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
         self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}

@@ -35,6 +35,8 @@ knots. These and the largest drag: of what was tried, what made the marginal lik
 Thresholds of friction have the same share in common."""
 HALVINGS = 4
 """How often the interval of knots next to zero is halved: the width at zero torque is that of a point, block means are not."""
+TOPMOST = 3
+"""Intervals of knots that make the topmost one: with fewer blocks in it its steps are not told, and loops bend at their tips."""
 BASELINE = ("geometric", "elastic", "friction")
 
 
@@ -189,7 +191,7 @@ def place_knots(torques, most: int, least: float) -> np.ndarray:
 
     Blocks are short where the angle moves fast, so the knots are dense where the loops are steep; next to zero they are denser.
     """
-    wanted = np.quantile(np.abs(torques), np.linspace(0.0, 1.0, most + 1)[1:-3])
+    wanted = np.quantile(np.abs(torques), np.linspace(0.0, 1.0, most + 1)[1:-TOPMOST])
     knots = spaced(np.r_[0.0, wanted, TOP], least)
     halved = knots[1] * 0.5 ** np.arange(HALVINGS, 0, -1)
     return np.r_[0.0, halved[halved >= least], knots[1:]]

@@ -23,13 +23,13 @@ _MOST_CYCLES = 20
 class Cycles:
     """Where a record's cycles are: numbers of their first segments, sample bounds [start, stop), amplitude [N·m].
 
-    ``gaps`` are each cycle's last torque beyond its first one, in shares of its first ramp; ``slope_rad_per_nm`` is the
+    ``unclosed`` are each cycle's last torque beyond its first one, in shares of its first ramp; ``slope_rad_per_nm`` is the
     angle's mean slope over the torque.
     """
 
     settled: bool
     starts: tuple[int, ...]
-    gaps: tuple[float, ...]
+    unclosed: tuple[float, ...]
     bounds: tuple[tuple[int, int], ...]
     amplitude_nm: float
     slope_rad_per_nm: float
@@ -55,8 +55,8 @@ def cycles_of(record: Record, segments) -> Cycles | None:
     last = 1 if pairs else 2
     bounds = tuple((segments[k].start, segments[k + last].stop) for k in starts)
     slope = float(np.ptp(record.angle_rad)) / (2.0 * amplitude)
-    gaps = tuple(float((levels[k + 2] - levels[k]) / (levels[k + 1] - levels[k])) for k in starts)
-    return Cycles(bool(pairs), starts, gaps, bounds, amplitude, slope)
+    unclosed = tuple(float((levels[k + 2] - levels[k]) / (levels[k + 1] - levels[k])) for k in starts)
+    return Cycles(bool(pairs), starts, unclosed, bounds, amplitude, slope)
 
 
 def area_weights(torque_nm: np.ndarray) -> np.ndarray:
@@ -64,15 +64,15 @@ def area_weights(torque_nm: np.ndarray) -> np.ndarray:
     return 0.5 * (np.roll(torque_nm, 1) - np.roll(torque_nm, -1))
 
 
-def settled_cycle(record: Record, segments, k: int, gap: float) -> dict:
+def settled_cycle(record: Record, segments, k: int, unclosed: float) -> dict:
     """Weights (samples,) of area, height, widths (None where zero torque is not passed) and drift of ramps k and k + 1.
 
-    A cycle that ends at another torque than it began at (by the share ``gap`` of its first ramp) ends at another angle too,
+    A cycle that ends at another torque than it began at (by the share ``unclosed`` of its first ramp) ends at another angle too,
     without any drift: by as much of the chord between its tips. ``closing`` are the weights of what that is worth in area.
     """
     start, stop = segments[k].start, segments[k + 1].stop
     first, middle, last = (_tip_weights(record, segments, edge) for edge in (k, k + 1, k + 2))
-    drift = last - first - gap * (middle - first)
+    drift = last - first - unclosed * (middle - first)
     share = np.zeros(len(record.time_s))
     share[start:stop] = np.linspace(0.0, 1.0, stop - start)
     area = np.zeros(len(record.time_s))
@@ -81,11 +81,11 @@ def settled_cycle(record: Record, segments, k: int, gap: float) -> dict:
     widths = _both_widths(record, segments, k)
     if widths is not None:
         widths = widths - np.outer(widths @ share, drift)
-    closing = (area @ share) * gap * (middle - first)
+    closing = (area @ share) * unclosed * (middle - first)
     return {"area": area - (area @ share) * drift, "height": height, "widths": widths, "drift": drift, "closing": closing}
 
 
-def first_cycle(record: Record, segments, k: int, gap: float) -> dict:
+def first_cycle(record: Record, segments, k: int, unclosed: float) -> dict:
     """As ``settled_cycle`` for ramps k to k + 2 from rest to rest, of which the middle one is full; no drift is taken out."""
     start, stop = segments[k].start, segments[k + 2].stop
     area = np.zeros(len(record.time_s))

@@ -56,7 +56,7 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
         return None
     weights = settled_cycle if found.settled else first_cycle
     # One cycle at a time: their weights are as long as the record.
-    mean = _mean(weights(record, segments, k, gap) for k, gap in zip(found.starts, found.gaps, strict=True))
+    mean = _mean(weights(record, segments, k, left) for k, left in zip(found.starts, found.unclosed, strict=True))
     area, height, drift = mean["area"], mean["height"], mean["drift"]
     # The chord stands for the slope at the tip, which may be half as much again, or half of it.
     closing = 0.5 * float(mean["closing"] @ record.angle_rad)

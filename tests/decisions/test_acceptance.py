@@ -116,7 +116,7 @@ def test_what_acts_unlisted_beside_a_named_module_is_uncovered():
 
 
 def test_no_verdict_on_the_gap_no_verdict_on_the_unit():
-    found = diagnosis([], none=0.97, sensor_lag=0.03) | {"inconclusive": "the search has not settled"}
+    found = diagnosis([], none=0.97, sensor_lag=0.03) | {"inconclusive": "the search has not settled", "gap": {"rms_rad": 1e-9}}
     for sds in (30, -30):
         assert judge(area(sds), e=evidence(diagnosis=found))["verdict"] == "inconclusive"
 

@@ -15,7 +15,7 @@ from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.reduced import Jitter, reduce_unit
 from backdrive_bayes.engine.sample import ABOVE, compress
 from backdrive_bayes.engine.start import possible_starts
-from backdrive_bayes.engine.traces import trace_of
+from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import HALVINGS, ReducerClass
@@ -188,7 +188,7 @@ def test_the_log_marginal_likelihood_of_a_unit_is_dense_algebra(clean):
 def test_a_clean_unit_has_one_mode_and_an_offset_adds_those_without_and_with_it_alone():
     assert len(linearise(reduce_unit(planted()), library_terms())) == 1
     found = linearise(reduce_unit(planted(offset_nm=8e-4)), library_terms())
-    trace = [np.log(trace_of(m, LIBRARY["torque_offset"][0])) for m in found]
+    trace = [np.log(trace_levels(m.reduced, m.design, m.effects)["torque_offset"]) for m in found]
     assert [m.log_scale["torque_offset"] == pytest.approx(t) for m, t in zip(found, trace, strict=True)] == [False, True, False]
     assert found[2].log_marginal > found[1].log_marginal + 50
 

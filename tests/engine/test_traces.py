@@ -10,7 +10,7 @@ from backdrive_bayes.engine.infer import library_terms, prepare
 from backdrive_bayes.engine.linearise import linearise
 from backdrive_bayes.engine.periodic import wave_group
 from backdrive_bayes.engine.reduced import reduce_unit
-from backdrive_bayes.engine.traces import ABOVE, TRACE, sample_noise, trace_level, trace_of, usual_of, wave_trace
+from backdrive_bayes.engine.traces import ABOVE, TRACE, sample_noise, trace_levels, usual_level, wave_trace
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 
 
@@ -32,12 +32,10 @@ def moved(linear, group, level):
 
 
 def test_every_trace_moves_the_angle_by_the_same_part_of_its_noise(linear):
-    told = []
-    for effect in linear.effects:
-        if effect is BENCH_HYSTERESIS or effect.name not in linear.design.names:
-            continue
-        group = linear.design.group(effect.name)
-        size, level = moved(linear, group, trace_of(linear, effect)), trace_of(linear, effect)
+    told, levels = [], trace_levels(linear.reduced, linear.design, linear.effects)
+    for effect in (e for e in linear.effects if e.name in levels and e is not BENCH_HYSTERESIS):
+        level = levels[effect.name]
+        size = moved(linear, linear.design.group(effect.name), level)
         assert size < 1.1 * TRACE and level <= effect.present(linear.reduced.context) * (1 + 1e-9), effect.name
         told += [effect.name] if level < 0.99 * effect.present(linear.reduced.context) else []
         assert level > 0.99 * effect.present(linear.reduced.context) or size == pytest.approx(TRACE, rel=0.1), effect.name
@@ -49,9 +47,10 @@ def test_so_does_the_trace_of_a_wave(linear):
 
 
 def test_what_acts_is_well_above_a_trace(linear):
-    for effect in linear.effects:
-        if effect is not BENCH_HYSTERESIS:
-            assert usual_of(linear, effect) >= ABOVE * trace_of(linear, effect)
+    levels = trace_levels(linear.reduced, linear.design, linear.effects)
+    for effect in (e for e in linear.effects if e.name in levels):
+        usual = usual_level(effect, linear.reduced.context, levels[effect.name])
+        assert usual >= ABOVE * levels[effect.name] and usual >= effect.present(linear.reduced.context)
 
 
 def test_traces_follow_the_noise(linear):
@@ -63,10 +62,11 @@ def test_traces_follow_the_noise(linear):
     )
     louder = dataclasses.replace(reduced, noise=twice)
     effect = next(e for e in linear.effects if e.name == "thermal_drift")
-    assert trace_level(louder, linear.design, effect) == pytest.approx(2 * trace_level(reduced, linear.design, effect), rel=0.02)
+    loud, quiet = (trace_levels(r, linear.design, [effect])[effect.name] for r in (louder, reduced))
+    assert loud == pytest.approx(2 * quiet, rel=0.02)
 
 
 def test_what_has_no_columns_leaves_no_trace():
     one_rate = linearise(reduce_unit(planted(3, loops=((0.1, 0.1),))), library_terms())[0]
-    law = next(e for e in one_rate.effects if e.name == "friction_rate")
-    assert trace_of(one_rate, law) == 0.0
+    levels = trace_levels(one_rate.reduced, one_rate.design, one_rate.effects)
+    assert "thermal_drift" in levels and "friction_rate" not in levels

@@ -127,8 +127,8 @@ def test_the_width_of_a_rest_at_zero_torque_is_that_at_zero():
 
 
 def _with_rests(time, torque):
-    """Times and torques of the corners of a path that rests at zero torque for a fifth of a second."""
-    at = np.flatnonzero(np.diff(np.sign(torque)))[1:]
-    knots = sorted([(time[i] - 0.1, torque[i] * 0.0) for i in at] + [(time[i] + 0.1, 0.0) for i in at])
-    tips = [(t, x) for t, x in zip(time, torque, strict=True) if min(abs(t - time[i]) for i in at) > 0.12]
-    return tuple(np.array(sorted(knots + tips)).T)
+    """Times and torques of a path that rests at zero torque for a fifth of a second on every ramp but the first."""
+    rests = [time[i] for i in np.flatnonzero(np.diff(np.sign(torque)))[1:]]
+    away = np.all([np.abs(time - t) > 0.12 for t in rests], axis=0)
+    corners = [(t + s, 0.0) for t in rests for s in (-0.1, 0.1)] + list(zip(time[away], torque[away], strict=True))
+    return tuple(np.array(sorted(corners)).T)
