@@ -1,75 +1,38 @@
-"""The modes of the few nonlinear parameters, effects present under a wide scale, and the linear models about them."""
+"""The modes of the few nonlinear parameters and the linear models about them."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from backdrive_bayes.engine.design import (
-    LEAST_LAW,
-    Group,
-    class_groups,
-    class_priors,
-    histories,
-    path_group,
-    tangent_groups,
-)
-from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
+from backdrive_bayes.engine.design import LEAST_LAW, Group, path_group
+from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import find_scales, whiten
+from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
-from backdrive_bayes.engine.reduced import Jitter, Reduced
+from backdrive_bayes.engine.reduced import Reduced
+from backdrive_bayes.engine.search import BENDING, LAW, LEAST_APART, STEPS, Search, length
 from backdrive_bayes.engine.start import possible_starts
-from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.engine.wander import learn_wander
-from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
-from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.reducer import BASELINE, TOP, ReducerClass, place_knots, spaced
-from backdrive_bayes.mechanics.registry import all_effects
+from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect
+from backdrive_bayes.mechanics.reducer import BASELINE
 
-KNOTS, MOST_KNOTS = 60, 140
-"""Knots of clearance and free play at first, and refined."""
-MOST_THRESHOLDS, CLOSEST = 46, 0.008
-"""Thresholds of friction at most, and the least distance of refined ones."""
-LEAST_APART = 0.3
-"""Least distance of knots in the torque noise of a sample."""
-CONSPICUOUS = 3.5
-"""Whitened residual beyond which the knots near a block are refined."""
-REFINEMENTS = 3
-LEARNINGS = 4
-"""How often the jitter is learnt at most: a prediction made with too little of it hides most of it."""
-STEPS = 14
 TRIAL_STEPS = 2
-LONGEST_STEP = 2e-3
-"""Longest step of a distortion, in shares of the torque; exponents fifty times as much."""
-LAW = "rate_dependent_friction"
-BENDING = {
-    "torque_offset": ("offset",),
-    "sensor_lag": ("lag_s",),
-    LAW: ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend"),
-}
-"""Effects whose columns are derivatives, and the places of their parameters in a distortion."""
 BENT = 2.0
 """Torque, in its noise, by which a distortion moves the prediction no longer along a straight line."""
-MOST_BENT = 2
-WIDE = 2.0
-"""Standard deviation of an effect's log scale while the mode is searched."""
 
 
-def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
-    """The joint model's mode, where every effect may act, and modes of what bends the prediction.
+def joint_mode(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, tuple[Group, ...]]:
+    """The mode where every effect may act, and the encoder's wave if it has one.
 
-    The joint mode is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside
+    It is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside
     the clearest wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
-    Whatever cannot be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own:
-    one where none of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode where it is
-    likeliest.
     """
-    fixed = tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))
+    fixed = _path_groups(reduced, effects)
     starts = possible_starts(reduced)
-    free = _Search(reduced, effects, modules, fixed)
+    free = Search(reduced, effects, modules, fixed)
     joint = free.run(Distortion(), STEPS, refine=True)
     others = _apart([Distortion(), *starts], reduced.context)[1:]
     if others:
@@ -90,9 +53,21 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain:
             joint, waves, wandering, gain = waved, (wave,), beside, more
     if gain > 0:
-        reduced = wandering
-        again = replace(free, reduced=reduced, fixed=(*fixed, *waves))
+        again = replace(free, reduced=wandering, fixed=(*fixed, *waves))
         joint = again.run(joint.distortion, STEPS, refine=True, jitter=joint.jitter)
+    return joint, waves
+
+
+def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
+    """The joint model's mode and modes of what bends the prediction.
+
+    Whatever cannot be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own:
+    one where none of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode where it is
+    likeliest.
+    """
+    joint, waves = joint_mode(reduced, effects, modules)
+    reduced, starts = joint.reduced, possible_starts(reduced)
+    fixed = _path_groups(joint.reduced, effects)
     late = max(start.lag_s for start in starts)
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
     bent = _bent(joint, reach)
@@ -100,7 +75,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
 
     def mode(some: tuple[str, ...]) -> Linear:
-        search = _Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
+        search = Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
         return search.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter)
 
     apart: dict[tuple[str, ...], Linear] = {}
@@ -108,9 +83,21 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         # A creep may stand for all of it.
         apart[(LAW,)] = mode((LAW,))
         bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, reduced.context) else bent
-    counts = range(min(len(bent), MOST_BENT) + 1 if bent else 0)
-    found = (apart.get(some) or mode(some) for count in counts for some in itertools.combinations(bent, count))
+    if bent:
+        apart |= {some: apart.get(some) or mode(some) for some in ((), *((name,) for name in bent))}
+        # Of two that act together each alone is likelier than nothing.
+        least = _of_traces(apart[()])
+        likelier = [name for name in bent if apart[(name,)].log_marginal > least]
+        apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
+    found = [linear for some, linear in apart.items() if set(some) <= set(bent)] if bent else []
     return tuple(linear.without(WAVE) for linear in (joint, *found))
+
+
+def _of_traces(linear: Linear) -> float:
+    """Log marginal likelihood where effects are traces only, about the same mode."""
+    scales = linear.design.scales(levels(linear, ()))
+    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
+    return find_scales(linear.data, scales, start)[1].log_marginal + linear.data.log_volume
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
@@ -122,7 +109,7 @@ def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
 def _bends(name: str, distortion: Distortion, context) -> bool:
     """Whether an effect moves the prediction further than along a straight line."""
     straight = replace(distortion, **dict.fromkeys(BENDING[name], 0.0))
-    return _length(distortion, straight, context) > BENT * context.torque_noise
+    return length(distortion, straight, context) > BENT * context.torque_noise
 
 
 def _only(distortion: Distortion, some) -> Distortion:
@@ -130,167 +117,14 @@ def _only(distortion: Distortion, some) -> Distortion:
     return replace(distortion, **{p: 0.0 for n, places in BENDING.items() if n not in some for p in places})
 
 
-@dataclass(frozen=True, eq=False)
-class _Search:
-    reduced: Reduced
-    effects: tuple[Effect, ...]
-    modules: tuple[str, ...]
-    fixed: tuple[Group, ...]
-    only: tuple[str, ...] | None = None
-
-    def run(self, distortion: Distortion, steps: int, refine: bool = False, jitter: Jitter | None = None) -> Linear:
-        reduced, context = self.reduced, self.reduced.context
-        jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
-        learnings = LEARNINGS if refine else 0
-        covariances = reduced.covariances(reduced.read_slopes, jitter)
-        laid, weights, refined = None, None, 0
-        known: dict[str, float] = {}
-        idle: set[str] = set()
-        for step in range(steps):
-            if laid is None or (not refined and _far(laid, distortion, context)):
-                laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules), None
-            if weights is None:
-                design = class_groups(reduced, reducer, distortion).joined(*self.fixed)
-                weights = design.split(self._solve(reducer, design, reduced.angles, covariances, known)[2].mean)
-            linear = self._linear(reducer, distortion, weights, covariances, known, jitter, idle)
-            known = linear.log_scale
-            weights, before, idle = linear.weights, idle, idle | self._backward(linear)
-            moved = self._moved(linear)
-            still = idle == before and _length(moved, distortion, context) < 0.05 * LONGEST_STEP
-            if learnings and (still or step >= 4):
-                found = learn_jitter(linear)
-                learnings, jitter = learnings - 1 if found != jitter else 0, found
-            covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
-            if refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
-                knots, thresholds = _refined(linear)
-                if knots.size + thresholds.size > reducer.knots.size + reducer.thresholds.size:
-                    reducer, weights, refined = ReducerClass(knots, self.modules, thresholds), None, refined + 1
-                    distortion = _towards(distortion, moved, context)
-                    continue
-            if still and step >= 2 and not learnings:
-                break
-            distortion = _towards(distortion, moved, context)
-        return linear
-
-    def _knots(self, distortion):
-        torques, context = [], self.reduced.context
-        for r, (history, settled) in enumerate(zip(histories(self.reduced, distortion), self.reduced.settled, strict=True)):
-            middle = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
-            torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
-        return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
-
-    def _linear(self, reducer, distortion, weights, covariances, known, jitter, idle):
-        core = class_groups(self.reduced, reducer, distortion)
-        tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
-        design = core.joined(*self.fixed, *tangents)
-        shift = _shift(design, distortion, self.effects, self.reduced.context)
-        angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
-        data, log_scale, solution = self._solve(reducer, design, angles, covariances, known, idle)
-        named = dict(zip(design.names, log_scale, strict=True))
-        explained = design.predict(design.split(solution.mean))
-        predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
-        waves = {n: w for n, w in design.split(solution.mean).items() if n == WAVE}
-        waving = tuple(w + np.zeros(a.size) for w, a in zip(design.predict(waves), angles, strict=True))
-        shared = (self.reduced, reducer, distortion, design, self.effects, angles, tuple(covariances), data)
-        return Linear(*shared, named, solution, jitter, predicted, waving)
-
-    def _solve(self, reducer, design, angles, covariances, known, idle=frozenset()):
-        """Whitened data, log scales and weights; ``known`` log scales by name are where the search begins."""
-        priors = class_priors(reducer)
-        traces = trace_levels(self.reduced, design, self.effects)
-        for effect in (e for e in self.effects if e.name in traces):
-            free = self._acts(effect) and effect.name not in idle
-            level = effect.present(self.reduced.context) if free else traces[effect.name]
-            priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
-        priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
-        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)
-        scales = design.scales(priors)
-        start = np.array([known.get(name, mean) for name, mean in zip(design.names, scales.mean, strict=True)])
-        return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean))
-
-    def _acts(self, effect) -> bool:
-        """Whether an effect may be more than a trace: all at the joint mode, none that bends where ``only`` is empty."""
-        if effect is BENCH_HYSTERESIS or self.only is None:
-            return self.only is None and effect is not BENCH_HYSTERESIS
-        names = self.only or [n for n in all_effects() if n not in BENDING]
-        return effect.name in {t.name for n in names for t in all_effects().get(n, ())}
-
-    def _backward(self, linear) -> set[str]:
-        """Effects that are one way and want to act the other way: they stay traces from then on."""
-        found = (e for e in self.effects if isinstance(e, TangentEffect) and e.one_way and e.name in linear.weights)
-        return {e.name for e in found if linear.weights[e.name][0] < 0.0}
-
-    def _moved(self, linear):
-        weights = linear.weights
-        tangent = {
-            e.parameter: float(weights[e.name][0]) for e in self.effects if isinstance(e, TangentEffect) and e.name in weights
-        }
-        return replace(linear.distortion, **tangent)
-
-
-def _shift(design, distortion, effects, context):
-    """What the tangent effects' columns make of the distortion itself, less the bench's usual friction."""
-    found = [0.0] * len(design.groups[0].columns)
-    for effect in effects:
-        if isinstance(effect, TangentEffect) and effect.name in design.names:
-            group = design.group(effect.name)
-            found = [f + c[:, 0] * getattr(distortion, effect.parameter) for f, c in zip(found, group.columns, strict=True)]
-        if effect is BENCH_HYSTERESIS:
-            group = design.group(effect.name)
-            found = [f - c[:, 0] * BENCH_HYSTERESIS.usual(context) for f, c in zip(found, group.columns, strict=True)]
-    return found
-
-
-def _step(moved, distortion, context):
-    """Step in shares of the torque scale; exponents weigh a fiftieth."""
-    step = np.array([getattr(moved, n) - getattr(distortion, n) for n in vars(distortion)])
-    return step * [1.0, context.rate.max(), 0.02, 0.02, 0.02, 0.02]
-
-
-def _length(moved, distortion, context) -> float:
-    return float(np.abs(_step(moved, distortion, context)).max())
-
-
-def _towards(distortion, moved, context):
-    share = min(1.0, LONGEST_STEP / max(_length(moved, distortion, context), 1e-300))
-    values = {n: getattr(distortion, n) + share * (getattr(moved, n) - getattr(distortion, n)) for n in vars(distortion)}
-    return Distortion(**values)
-
-
-def _far(laid, distortion, context) -> bool:
-    return _length(laid, distortion, context) > LEAST_APART * context.torque_noise
-
-
 def _apart(starts, context):
     """Starts that differ by more than the distance of knots."""
     kept = []
     for start in starts:
-        if all(_length(start, other, context) > 2 * LEAST_APART * context.torque_noise for other in kept):
+        if all(length(start, other, context) > 2 * LEAST_APART * context.torque_noise for other in kept):
             kept.append(start)
     return kept
 
 
-def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
-    """Knots, and thresholds of friction, with more of both where settled blocks leave a conspicuous residual, the worst first
-    until there are MOST_KNOTS and MOST_THRESHOLDS: a step is crossed at a torque, a slip begins at a distance from the last
-    turning point.
-    """
-    reduced, wanted = linear.reduced, []
-    knots, thresholds = linear.reducer.knots, linear.reducer.thresholds
-    for blocks, white, settled in zip(reduced.blocks, linear.residuals(), reduced.settled, strict=True):
-        low, high = blocks.edges_nm() / reduced.torque_scale_nm
-        turn = blocks.turning_nm[blocks.leg] / reduced.torque_scale_nm
-        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & settled).tolist():
-            about = range(max(i - 1, 0), min(i + 2, white.size))
-            torques = np.concatenate([np.linspace(low[j], high[j], 5) for j in about])
-            wanted.append((abs(white[i]), torques, 0.5 * np.abs(torques - turn[i])))
-    wanted.sort(key=lambda found: -found[0])
-    least = 0.8 * LEAST_APART * reduced.context.torque_noise
-    for _, torques, slips in wanted:
-        inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
-        finer = spaced(np.r_[inner[inner < TOP], TOP], least)
-        knots = finer if finer.size <= MOST_KNOTS else knots
-        for slip in slips[(slips > thresholds[0]) & (slips < thresholds[-1])]:
-            if thresholds.size < MOST_THRESHOLDS and np.abs(thresholds - slip).min() >= CLOSEST:
-                thresholds = np.sort(np.r_[thresholds, slip])
-    return knots, thresholds
+def _path_groups(reduced, effects):
+    return tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))

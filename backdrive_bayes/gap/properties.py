@@ -2,7 +2,8 @@
 
 Evidence against the class cannot find what the class holds. What tells a property are the two branches of the settled loop
 beside each other. A clearance with drag is crossed while loading and not while unloading, so a second one is a step of the
-difference of the branches, in which elasticity cancels and to which friction adds no step. A clamp that slips yields more the
+difference of the branches, in which elasticity cancels and to which friction adds no step. It needs a first one, crossed at less
+torque: a reducer may cross its only clearance against much drag. A clamp that slips yields more the
 nearer the loading branch comes to the tip, while contacts only harden. The probability of each is that of its size among those
 that are there, not among those that reducers have without it; steps of the unloading branch, where nothing is crossed, tell how
 uneven the reading is.
@@ -28,10 +29,10 @@ MEDIAN_SQUARE = 0.455
 """Median of the square of a standard normal variable."""
 TORQUES = np.geomspace(0.1, 0.6, 22)
 """Torques, in shares of the largest, about which a second clearance may be crossed; all are as likely."""
-APART = 1.5
-"""A second clearance is crossed at so many times the torque of the first at least."""
 WIDTHS = (1.15, 1.25, 1.45)
 """A step is crossed from its torque divided by one of these to its torque times it; flanks as wide lie on both sides."""
+SPLITS = np.geomspace(0.01, 0.5, 25)
+"""Torques below which a first clearance may be crossed."""
 ONSETS = (0.6, 0.7, 0.8, 0.9)
 """Torques from which on a clamp may slip on the settled loading branch; all are as likely."""
 BEFORE = 0.3
@@ -42,6 +43,8 @@ LARGE = 0.06
 """That of a second clearance or of slip where there is one."""
 OWN = (0.01, 0.5)
 """Share of reducers whose own clearance is crossed in steps within TORQUES, and the standard deviation of such steps."""
+SOFTENING = (0.05, LARGE)
+"""Share of reducers that soften towards full load without a clamp that slips, and by how much."""
 SURE = 0.97
 """No property is more certain than this: thresholds are practical, not physical."""
 
@@ -94,15 +97,29 @@ def steps(z, angle, steeper: bool = True) -> np.ndarray:
     return np.stack(found, axis=1)
 
 
-def slips(branches: Branches) -> np.ndarray:
+def crossed_before(z, angle) -> np.ndarray:
+    """Angle that is crossed before every step beyond what the flank between gives, split where that is most in the mean over
+    draws, (draws, widths, torques)."""
+    begin = TORQUES / np.array(WIDTHS)[:, None]
+    early = _at(z, angle, SPLITS) - angle[:, :1]
+    late = (_at(z, angle, begin.ravel()) - angle[:, :1]).reshape(-1, *begin.shape)
+    found, most = np.zeros_like(late), np.full(begin.shape, -np.inf)
+    for torque, gained in zip(SPLITS, early.T[..., None, None], strict=True):
+        beyond = gained - torque * (late - gained) / np.maximum(begin - torque, SPLITS[0])
+        mean = np.where(begin > WIDTHS[0] * torque, beyond.mean(axis=0), -np.inf)
+        found, most = np.where(mean > most, beyond, found), np.maximum(most, mean)
+    return found
+
+
+def slips(z, angle) -> np.ndarray:
     """Angle gained from every onset to full load beyond what the branch before the onset gives, (draws, onsets): its compliance
     there, and if that grows already, its growth (a body softens little by little)."""
     onset = np.array(ONSETS)
-    early, middle, there = (_at(branches.z, branches.loading, x) for x in (onset - BEFORE, onset - 0.5 * BEFORE, onset))
+    early, middle, there = (_at(z, angle, x) for x in (onset - BEFORE, onset - 0.5 * BEFORE, onset))
     compliance = (there - early) / BEFORE
     growth = np.maximum((there - 2.0 * middle + early) / (0.5 * BEFORE) ** 2, 0.0)
     left = 1.0 - onset
-    return branches.loading[:, -1:] - there - compliance * left - 0.5 * growth * left * (left + BEFORE)
+    return angle[:, -1:] - there - compliance * left - 0.5 * growth * left * (left + BEFORE)
 
 
 def unevenness(branches: Branches) -> np.ndarray:
@@ -112,15 +129,16 @@ def unevenness(branches: Branches) -> np.ndarray:
     return np.maximum(usual - np.median(apparent.var(axis=0), axis=1), 0.0)
 
 
-def present(sizes, uneven=0.0, own: float = 0.0) -> tuple[float, int]:
+def present(sizes, uneven, own: tuple[float, float]) -> tuple[float, int]:
     """Log Bayes factor that one of the sizes (draws, places), whichever, is of those that are there, and the likeliest place.
 
     Sizes that are there are half-normal with LARGE, those that every reducer has normal about zero with USUAL and the variance
-    ``uneven``; in a share ``own`` of reducers without the property one place has a step of their own clearance (OWN).
+    ``uneven``; in a share of reducers without the property one place has a size of another origin, half-normal as well (``own``:
+    share and standard deviation).
     """
     mean, variance = sizes.mean(axis=0), sizes.var(axis=0) + USUAL**2 + uneven
-    there, other = (_gain(mean, variance, sd) for sd in (LARGE, OWN[1]))
-    without = logsumexp([0.0, logsumexp(other) - np.log(other.size)], b=[1.0 - own, own])
+    there, other = (_gain(mean, variance, sd) for sd in (LARGE, own[1]))
+    without = logsumexp([0.0, logsumexp(other) - np.log(other.size)], b=[1.0 - own[0], own[0]])
     return float(logsumexp(there) - np.log(there.size) - without), int(np.argmax(there))
 
 
@@ -132,26 +150,20 @@ def find_properties(weighed: Weighed, rng) -> tuple[Property, ...]:
 
 def properties_of(branches: Branches, angle_scale_rad: float, torque_scale_nm: float) -> tuple[Property, ...]:
     """Second clearance and interface slip of a settled loop."""
-    beyond = TORQUES >= APART * first_clearance(branches)
-    crossed = steps(branches.z, branches.loading - branches.unloading)[:, :, beyond]
+    apart = branches.loading - branches.unloading
+    # A second clearance is as large as the smaller of two.
+    crossed = np.minimum(steps(branches.z, apart), crossed_before(branches.z, apart))
     uneven = unevenness(branches)
     # The difference of two branches is as uneven as both.
-    twice = np.repeat(2.0 * uneven, beyond.sum())
-    second = crossed.reshape(crossed.shape[0], -1), np.tile(TORQUES[beyond], len(WIDTHS)), twice, OWN[0]
-    slip = slips(branches), np.array(ONSETS), uneven[1], 0.0
+    twice = np.repeat(2.0 * uneven, TORQUES.size)
+    second = crossed.reshape(crossed.shape[0], -1), np.tile(TORQUES, len(WIDTHS)), twice, OWN
+    slip = slips(branches.z, branches.loading), np.array(ONSETS), uneven[1], SOFTENING
     found = []
     for name, (sizes, torques, variance, own) in (("second_backlash", second), ("interface_slip", slip)):
         log_factor, best = present(sizes, variance, own)
         probability = float(np.clip(expit(log_factor + CALIBRATION.single), 1.0 - SURE, SURE))
         found.append(Property(name, probability, sizes[:, best] * angle_scale_rad, float(torques[best]) * torque_scale_nm))
     return tuple(found)
-
-
-def first_clearance(branches: Branches) -> float:
-    """Torque of the steepest point of the loading branch below TORQUES."""
-    middle = 0.5 * (branches.z[1:] + branches.z[:-1])
-    slope = np.diff(branches.loading.mean(axis=0)) / np.diff(branches.z)
-    return float(middle[np.argmax(np.where(middle <= TORQUES[0], slope, -np.inf))])
 
 
 def _beside_effects(weighed: Weighed) -> Linear:

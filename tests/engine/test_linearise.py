@@ -7,6 +7,7 @@ import pytest
 from support.planted import MORE, SCALE, UNITS, joint_mode, planted, smooth_reducer
 
 from backdrive_bayes.engine import linearise as engine
+from backdrive_bayes.engine import search
 from backdrive_bayes.engine.design import class_groups, class_priors
 from backdrive_bayes.engine.infer import library_terms, prepare
 from backdrive_bayes.engine.jitter import learn_jitter
@@ -99,7 +100,7 @@ def test_a_planted_jitter_is_found_within_a_factor_of_three(jitter):
 
 
 def test_jitter_that_is_not_learnt_is_seen_in_the_residual(monkeypatch):
-    monkeypatch.setattr(engine, "LEARNINGS", 0)
+    monkeypatch.setattr(search, "LEARNINGS", 0)
     found = mode(jitter=(0.005, 0.05), drag=0.12, engagement=0.35)
     assert min(np.mean(r**2) for r in found.residuals()) > 3.0
 
@@ -113,9 +114,9 @@ def test_knots_are_dense_where_the_loop_is_steep(clean):
 
 def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
     """With few knots to begin with, a steep clearance leaves a residual; refined, it does not."""
-    monkeypatch.setattr(engine, "KNOTS", 8)
+    monkeypatch.setattr(search, "KNOTS", 8)
     refined = mode(engagement=0.05)
-    monkeypatch.setattr(engine, "REFINEMENTS", 0)
+    monkeypatch.setattr(search, "REFINEMENTS", 0)
     coarse = mode(engagement=0.05)
     assert coarse.reducer.knots.size <= 10 + HALVINGS < refined.reducer.knots.size
     near, whole = (np.sum(np.abs(m.reducer.knots - 0.05) < 0.03) for m in (refined, coarse)), refined.reducer.knots.size
@@ -129,11 +130,11 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     first = int(np.flatnonzero(clean.reduced.blocks[0].leg == 1)[20])
     worst[0][clean.reduced.blocks[0].leg > 0] = 4.0
     worst[0][first] = 9.0
-    monkeypatch.setattr(engine, "MOST_KNOTS", clean.reducer.knots.size + 20)
+    monkeypatch.setattr(search, "MOST_KNOTS", clean.reducer.knots.size + 20)
     monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
-    found, thresholds = engine._refined(clean)
+    found, thresholds = search._refined(clean)
     low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
-    assert clean.reducer.knots.size < found.size <= engine.MOST_KNOTS
+    assert clean.reducer.knots.size < found.size <= search.MOST_KNOTS
     new = np.setdiff1d(found, clean.reducer.knots)
     width = high - low
     assert np.any((new > low - width) & (new < high + width))
@@ -141,7 +142,7 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     tip = clean.reduced.blocks[0].turning_nm[1] / clean.reduced.torque_scale_nm
     slip = 0.5 * abs(clean.reduced.blocks[0].torque_nm[first] / clean.reduced.torque_scale_nm - tip)
     more = np.setdiff1d(thresholds, clean.reducer.thresholds)
-    assert 0 < more.size <= engine.MOST_THRESHOLDS and np.abs(more - slip).min() < width
+    assert 0 < more.size <= search.MOST_THRESHOLDS and np.abs(more - slip).min() < width
 
 
 def test_nothing_counts_where_the_past_decides(clean):

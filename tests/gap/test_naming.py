@@ -114,7 +114,8 @@ def test_a_wave_of_one_and_a_half_periods_is_an_encoder_error_and_a_soft_flank_i
 @pytest.mark.parametrize(("name", "size", "torque"), [("second_backlash", 0.15, 0.3), ("interface_slip", 0.1, None)])
 def test_properties_are_found_on_units_that_have_them_and_not_on_others(name, size, torque):
     here, elsewhere = found(name)[1][name], found("none")[1][name]
-    assert here.probability > 0.9 and elsewhere.probability < 0.35
+    # Half of the loops that look like slip have none: its probability ends at a half.
+    assert here.probability > (0.5 if name == "interface_slip" else 0.9) and elsewhere.probability < 0.35
     assert np.median(here.size_rad) == pytest.approx(0.02 * size, rel=0.35)
     assert torque is None or here.torque_nm == pytest.approx(0.1 * torque, rel=0.1)
     other = "interface_slip" if name == "second_backlash" else "second_backlash"

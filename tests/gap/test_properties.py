@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from backdrive_bayes.gap.properties import Branches, first_clearance, properties_of, steps, unevenness
+from backdrive_bayes.gap.properties import Branches, properties_of, steps, unevenness
 
 Z = np.linspace(0.0, 1.0, 1001)
 NOISE = 1e-3
@@ -19,13 +19,13 @@ def crossed(size, torque, width=0.06):
     return size / (1.0 + np.exp(-(Z - torque) / (0.2 * width * torque)))
 
 
-def loop(loading=0.0, unloading=0.0, hardening=0.5, threshold=0.1):
-    """A settled loop: a clearance at 0.03, contacts that harden, friction that lets go on unloading at 1 - 2·threshold."""
+def loop(loading=0.0, unloading=0.0, hardening=0.5, threshold=0.1, first=0.03):
+    """A settled loop: a clearance at ``first``, contacts that harden, friction that lets go on unloading at 1 - 2·threshold."""
     elastic = angle(1.0 - hardening * Z)
     sliding = angle(0.3 / (1.0 + np.exp((Z - 1.0 + 2.0 * threshold) / 0.03)))
     draws = NOISE * np.random.default_rng(0).standard_normal((2, 100, 12))
     wander = [np.array([np.interp(Z, np.linspace(0, 1, 12), d) for d in side]) for side in draws]
-    up = elastic + crossed(0.6, 0.03) + 0.3 * Z + loading
+    up = elastic + crossed(0.6, first) + 0.3 * Z + loading
     return Branches(Z, up + wander[0], elastic + sliding + unloading + wander[1])
 
 
@@ -35,7 +35,6 @@ def found(branches):
 
 
 def test_a_loop_of_clearance_hardening_and_friction_has_neither():
-    assert first_clearance(loop()) == pytest.approx(0.03, abs=0.005)
     assert max(p.probability for p in found(loop()).values()) < 0.1
     assert max(p.probability for p in found(loop(threshold=0.35)).values()) < 0.1
 
@@ -51,7 +50,7 @@ def test_a_second_clearance_is_found_with_its_size_and_torque(size, torque):
 def test_a_second_clearance_is_found_beside_steep_friction_and_slip_beside_it():
     slip = angle(0.4 * np.clip(Z - 0.75, 0.0, None) / 0.25)
     both = found(loop(loading=crossed(0.04, 0.3) + slip, hardening=0.2))
-    assert min(p.probability for p in both.values()) > 0.9
+    assert both["second_backlash"].probability > 0.9 and both["interface_slip"].probability > 0.5
 
 
 def test_a_step_of_both_branches_is_elastic():
@@ -74,9 +73,19 @@ def test_teeth_of_the_first_clearance_that_engage_late_are_no_second_one():
     assert found(loop(loading=crossed(0.6, 0.25)))["second_backlash"].probability < 0.1
 
 
+@pytest.mark.parametrize("torque", [0.15, 0.25, 0.45])
+def test_the_only_clearance_is_no_second_one_however_late_it_is_crossed(torque):
+    """Against much drag a reducer crosses its clearance late; with one before it, the same step is a second."""
+    small = crossed(0.1, torque)
+    alone = Branches(Z, loop(first=0.03).loading - crossed(0.6, 0.03) + small, loop().unloading)
+    assert found(alone)["second_backlash"].probability < 0.1
+    assert found(loop(loading=small))["second_backlash"].probability > 0.9
+
+
 def test_slip_is_compliance_that_grows_towards_the_tip():
     there = found(loop(loading=angle(0.5 * (Z > 0.8)), hardening=0.2))["interface_slip"]
-    assert there.probability > 0.9 and there.torque_nm == pytest.approx(0.8, abs=0.11)
+    # Some reducers soften like that without a clamp: no slip is surer than those let it be.
+    assert 0.5 < there.probability < 0.6 and there.torque_nm == pytest.approx(0.8, abs=0.11)
     # What grows as much while unloading is friction letting go, what falls is hardening.
     assert found(loop(unloading=angle(0.5 * (Z > 0.8)), hardening=0.2))["interface_slip"].probability < 0.1
     assert found(loop(loading=angle(-0.2 * (Z > 0.8)), hardening=0.2))["interface_slip"].probability < 0.1

@@ -5,12 +5,12 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pytest
 from scipy.signal import lfilter
 
 from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, angle_noise, physical_reducer, ramp
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.infer import prepare
+from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.records.record import Record, Unit
 
 NOISE = BenchNoise()
@@ -112,9 +112,7 @@ def prepared(name):
 
 def joint_mode(reduced, effects):
     """The first of the modes of ``linearise``; the others, of each bending effect alone, are not searched."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(engine, "MOST_BENT", -1)
-        return engine.linearise(reduced, effects)[0]
+    return engine.joint_mode(reduced, effects)[0].without(WAVE)
 
 
 def _firmer(known, factor):
