@@ -58,6 +58,7 @@ def physical_reducer(
         "friction": 2 * friction * plays / (plays @ friction_cells.width),
         "clearance": clearance * crossed / crossed.sum(),
         "free_play": np.zeros(steps.count),
+        "compliance": np.zeros(1),
     }
     return KnownReducer({n: w * np.exp(scatter * rng.standard_normal(w.size)) for n, w in weights.items()})
 

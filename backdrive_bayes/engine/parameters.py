@@ -97,12 +97,12 @@ def _hardening(op: Operator) -> np.ndarray:
 
 
 def _compliance_zero(op: Operator) -> np.ndarray:
-    return op.loading_slope(("elastic", "friction"), 0.0, NEAR_ZERO * op.end)
+    return op.loading_slope(("compliance", "elastic", "friction"), 0.0, NEAR_ZERO * op.end)
 
 
 def _compliance_rated(op: Operator) -> np.ndarray:
     # So far up every step is compliance: clearance is crossed below.
-    return op.loading_slope(("elastic", "friction", "clearance", "free_play"), NEAR_RATED * op.end, op.end)
+    return op.loading_slope(("compliance", "elastic", "friction", "clearance", "free_play"), NEAR_RATED * op.end, op.end)
 
 
 def _near(op: Operator) -> np.ndarray:

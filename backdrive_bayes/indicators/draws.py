@@ -40,7 +40,7 @@ CORE = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area
 RESPONSES = ("theta_L_rad", "W_L_J", "loop_area_J", "S_g_J", "S_f_J")
 MOVED = {
     "clearance_rad": ("clearance", "free_play"),
-    "compliance_rated_rad_per_Nm": ("elastic", "friction"),
+    "compliance_rated_rad_per_Nm": ("compliance", "elastic", "friction"),
     "drag_torque_Nm": (),
     "friction_torque_Nm": (),
 }

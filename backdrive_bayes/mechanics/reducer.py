@@ -77,7 +77,7 @@ class ReducerClass:
         unknown = [m for m in self.modules if m not in BASELINE]
         if unknown or "elastic" not in self.modules:
             raise BadInput("--baseline", f"modules out of {', '.join(BASELINE)}, elastic among them", ",".join(self.modules))
-        made = (_elastic(), _friction(self.thresholds), _clearance(self.knots), _free_play(self.knots))
+        made = (_compliance(), _elastic(), _friction(self.thresholds), _clearance(self.knots), _free_play(self.knots))
         object.__setattr__(self, "parts", tuple(p for p in made if p.module in self.modules))
 
     def part(self, name: str) -> Part:
@@ -126,6 +126,13 @@ class ReducerClass:
 def _response(cells, history, weights, ends, sign=1.0):
     """Sum of the cells' responses times ``weights`` (cells,), block means or at the segments' ends."""
     return cells.ends(history, sign=sign) @ weights if ends else cells.summed(history, weights, sign=sign)
+
+
+def _compliance() -> Part:
+    """A constant compliance, about half of the angle scale at the torque scale (the rest is clearance and friction): no friction
+    of thresholds too small to be told, which would rest at the tips, need stand for it."""
+    cells = Cells(np.zeros(1), np.zeros(1), np.full(1, TOP), np.full(1, 2.0))
+    return Part("compliance", "elastic", cells, None, (0.0, 0.0))
 
 
 def _elastic() -> Part:

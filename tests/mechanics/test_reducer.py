@@ -139,7 +139,7 @@ def test_flanks_that_differ_are_even_in_the_torque():
     here, there = (REDUCER.flank_columns(ramp(0.0, s, -s, s), weights) for s in (1.0, -1.0))
     np.testing.assert_allclose(there, here, atol=1e-10)
     ends = REDUCER.flank_columns(ramp(0.0, 1.0), weights, ends=True)
-    assert ends.shape == (199, 4) and np.abs(here).max() > 0.01
+    assert ends.shape == (199, len(REDUCER.parts)) and np.abs(here).max() > 0.01
 
 
 def test_knots_are_dense_where_blocks_are_and_keep_their_distance():
@@ -190,3 +190,15 @@ def test_loops_do_not_bend_at_their_tips():
     top = history.z1[-400:] > knots[-2]
     assert knots[-2] < 0.97 and slope[top].mean() == pytest.approx(slope[(history.z1[-400:] > 0.5) & ~top].mean(), rel=0.05)
     assert (cells.norm[-1] / cells.width[-1]) == pytest.approx((1.0 - knots[-2]) / (TOP - knots[-2]))
+
+
+def test_a_stiff_tip_is_not_cut_by_friction_too_fine_to_be_told():
+    """A unit's compliance costs the prior nothing as a constant, and a fortune as friction of the smallest thresholds, which
+    would hold the loop still at its tips."""
+    parts = {p.name: p for p in REDUCER.parts}
+    assert parts["compliance"].log_scale == (0.0, 0.0)
+    up = REDUCER.ends(ramp(0.0, 1.0))["compliance"][:, 0]
+    # One weight is half of the angle scale at the torque scale, and back on the same line.
+    assert up[-1] == pytest.approx(0.5, abs=1e-12)
+    back = REDUCER.ends(ramp(0.0, 1.0, 0.0))["compliance"][:, 0]
+    assert back[-1] == pytest.approx(0.0, abs=1e-12)
