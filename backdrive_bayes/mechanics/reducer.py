@@ -1,8 +1,8 @@
 """The class of clean reducers: odd, rate-independent hysteresis operators, linear in their weights.
 
-Four parts share the Preisach plane: smooth elasticity, friction (play operators over thresholds and read-outs), clearance
-(relays that cross at +a and back at -a, each tooth at its own a) and free play (steps without drag). Clearance and free play are
-refined where the loops are steep; together they hold any odd settled loop at the resolution of their knots.
+Five parts share the Preisach plane: a constant compliance, smooth elasticity beside it, friction (play operators over thresholds
+and read-outs), clearance (relays that cross at +a and back at -a, each tooth at its own a) and free play (steps without drag).
+Clearance and free play are refined where the loops are steep; together they hold any odd settled loop at the resolution of their knots.
 """
 
 from __future__ import annotations
