@@ -45,8 +45,8 @@ softens a slip. All this was mended before the run shown here, so neither is uns
 called none 0.54, unlisted called unknown 0.80, pairs 0.30, sets cover 0.71, log score -2.36. That run showed that bits of a leg
 at a record's end bent the torque's path and that traces were smaller than the bench's; its row here is of the code after that was
 mended. The rows of all others were weighed before that, before the torque's path was made of lines and before an encoder's wave
-had a phase of its own in records of other zeros. `fifth-outside`: `studies/fifth_outside_bench.py --units 80 --seed 41`, the only
-row of a bench that nobody had looked at: its first run, by the present code."""
+had a phase of its own in records of other zeros. `fifth-outside`: `studies/fifth_outside_bench.py --units 80 --seed 41`, its
+first run, before it was looked at: nothing was mended by it (the class has got a constant compliance since)."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
 POSITIVE = ("cool", "warm", "spread")
 """Numbers that are searched on a logarithmic scale."""

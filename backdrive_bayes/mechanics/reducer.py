@@ -2,7 +2,8 @@
 
 Five parts share the Preisach plane: a constant compliance, smooth elasticity beside it, friction (play operators over thresholds
 and read-outs), clearance (relays that cross at +a and back at -a, each tooth at its own a) and free play (steps without drag).
-Clearance and free play are refined where the loops are steep; together they hold any odd settled loop at the resolution of their knots.
+Clearance and free play are refined where the loops are steep; together they hold any odd settled loop at the resolution of their
+knots.
 """
 
 from __future__ import annotations
