@@ -1,7 +1,7 @@
 """A fifth virtual bench written without sight of the package: contact and friction mechanics of seven kinds of reducer.
 
-    python fifth_outside_bench.py /work/w5 --units 80 --seed 41
-    python fifth_outside_bench.py /tmp/x --selfcheck --seed 41
+    python studies/fifth_outside_bench.py /tmp/fifth --units 80 --seed 41
+    python studies/fifth_outside_bench.py /tmp/fifth --selfcheck --seed 41
 
 One file, no import of the package; units go to OUT/u/case-XX, the key to OUT/u/key.json. Cycloid discs on single pins, floating
 planetary stages, strain-wave tooth zones, fretting shaft-hub joints (shear lag, pressure follows the load), filled rubber and

@@ -7,10 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import gammaincinv
 
-from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.linearise import linearise
-from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.engine.reduced import Reduced, reduce_unit
@@ -55,9 +54,7 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
 
     ``hypothesis`` names effects that are present while all others stay at trace level.
     """
-    scales = linear.design.scales(levels(linear, hypothesis))
-    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
-    mode, solution = find_scales(linear.data, scales, start)
+    scales, mode, solution = learn_scales(linear, levels(linear, hypothesis))
     drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWERS)
     reduced, names = linear.reduced, linear.design.names
     return Posterior(

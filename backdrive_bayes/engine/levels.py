@@ -1,11 +1,14 @@
-"""Prior scales of every group of columns under a hypothesis."""
+"""Prior scales of every group of columns under a hypothesis, and what a unit teaches of them."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 
 from backdrive_bayes.engine.design import class_priors
 from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.marginal import Scales, Solution, find_scales
 from backdrive_bayes.engine.traces import trace_levels, usual_level
 from backdrive_bayes.mechanics.registry import all_effects
 
@@ -28,3 +31,10 @@ def levels(linear: Linear, hypothesis: tuple[str, ...], off: tuple[str, ...] = (
     for name in linear.design.names:
         priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))
     return priors
+
+
+def learn_scales(linear: Linear, priors: Mapping[str, tuple[float, float]]) -> tuple[Scales, np.ndarray, Solution]:
+    """Scales with these priors, the likeliest logarithms of them, searched from those of the joint model, and the solution."""
+    scales = linear.design.scales(priors)
+    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
+    return scales, *find_scales(linear.data, scales, start)

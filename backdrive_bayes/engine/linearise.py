@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from backdrive_bayes.engine.design import LEAST_LAW, Group, path_group
-from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.design import LEAST_LAW, Group
+from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.engine.search import BENDING, LAW, LEAST_APART, STEPS, Search, length
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.wander import learn_wander
-from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect
+from backdrive_bayes.mechanics.effect import Distortion, Effect
 from backdrive_bayes.mechanics.reducer import BASELINE
 
 TRIAL_STEPS = 2
@@ -24,17 +24,14 @@ BENT = 2.0
 """Torque, in its noise, by which a distortion moves the prediction no longer along a straight line."""
 
 
-def joint_mode(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, tuple[Group, ...]]:
-    """The mode where every effect may act, and the encoder's wave if it has one.
+def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tuple[Group, ...]]:
+    """The mode of a search where every effect may act, and the encoder's wave if it has one.
 
     It is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside
     the clearest wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
     """
-    fixed = _path_groups(reduced, effects)
-    starts = possible_starts(reduced)
-    free = Search(reduced, effects, modules, fixed)
     joint = free.run(Distortion(), STEPS, refine=True)
-    others = _apart([Distortion(), *starts], reduced.context)[1:]
+    others = _apart([Distortion(), *starts], free.reduced.context)[1:]
     if others:
         begin = max(others, key=lambda start: free.run(start, TRIAL_STEPS).log_marginal) if len(others) > 1 else others[0]
         joint = max(joint, free.run(begin, STEPS, refine=True), key=lambda ended: ended.log_marginal)
@@ -43,17 +40,17 @@ def joint_mode(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) 
     clear, frequency = clearest_wave(joint)
     if clear > 0:
         wave = periodic_group(joint, frequency)
-        waved = replace(free, fixed=(*fixed, wave)).run(joint.distortion, STEPS, refine=True)
+        waved = replace(free, fixed=(*free.fixed, wave)).run(joint.distortion, STEPS, refine=True)
         # Of a large wave, what the encoder reads is not the angle at which it errs.
         turned = periodic_group(waved, frequency)
-        nearer = replace(free, fixed=(*fixed, turned)).run(waved.distortion, STEPS, refine=True, jitter=waved.jitter)
+        nearer = replace(free, fixed=(*free.fixed, turned)).run(waved.distortion, STEPS, refine=True, jitter=waved.jitter)
         if nearer.log_marginal > waved.log_marginal:
             wave, waved = turned, nearer
         beside, more = learn_wander(waved)
         if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain:
             joint, waves, wandering, gain = waved, (wave,), beside, more
     if gain > 0:
-        again = replace(free, reduced=wandering, fixed=(*fixed, *waves))
+        again = replace(free, reduced=wandering, fixed=(*free.fixed, *waves))
         joint = again.run(joint.distortion, STEPS, refine=True, jitter=joint.jitter)
     return joint, waves
 
@@ -65,9 +62,9 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     one where none of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode where it is
     likeliest.
     """
-    joint, waves = joint_mode(reduced, effects, modules)
-    reduced, starts = joint.reduced, possible_starts(reduced)
-    fixed = _path_groups(joint.reduced, effects)
+    free, starts = Search.over(reduced, effects, modules), possible_starts(reduced)
+    joint, waves = joint_mode(free, starts)
+    context = joint.reduced.context
     late = max(start.lag_s for start in starts)
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
     bent = _bent(joint, reach)
@@ -75,29 +72,27 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
 
     def mode(some: tuple[str, ...]) -> Linear:
-        search = Search(reduced, effects, modules, (*fixed, *(waves if WAVE in some else ())), some)
-        return search.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter)
+        own = replace(free, reduced=joint.reduced, fixed=(*free.fixed, *(waves if WAVE in some else ())), only=some)
+        return own.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter)
 
     apart: dict[tuple[str, ...], Linear] = {}
-    if LAW not in bent and np.ptp(reduced.context.log_rate) > LEAST_LAW:
+    if LAW not in bent and np.ptp(context.log_rate) > LEAST_LAW:
         # A creep may stand for all of it.
         apart[(LAW,)] = mode((LAW,))
-        bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, reduced.context) else bent
+        bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent
     if bent:
         apart |= {some: apart.get(some) or mode(some) for some in ((), *((name,) for name in bent))}
         # Of two that act together each alone is likelier than nothing.
         least = _of_traces(apart[()])
         likelier = [name for name in bent if apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
-    found = [linear for some, linear in apart.items() if set(some) <= set(bent)] if bent else []
+    found = [linear for some, linear in apart.items() if set(some) <= set(bent)]
     return tuple(linear.without(WAVE) for linear in (joint, *found))
 
 
 def _of_traces(linear: Linear) -> float:
     """Log marginal likelihood where effects are traces only, about the same mode."""
-    scales = linear.design.scales(levels(linear, ()))
-    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
-    return find_scales(linear.data, scales, start)[1].log_marginal + linear.data.log_volume
+    return learn_scales(linear, levels(linear, ()))[2].log_marginal + linear.data.log_volume
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
@@ -124,7 +119,3 @@ def _apart(starts, context):
         if all(length(start, other, context) > 2 * LEAST_APART * context.torque_noise for other in kept):
             kept.append(start)
     return kept
-
-
-def _path_groups(reduced, effects):
-    return tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect))

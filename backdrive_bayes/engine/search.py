@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backdrive_bayes.engine.design import Group, class_groups, class_priors, histories, tangent_groups
+from backdrive_bayes.engine.design import Group, class_groups, class_priors, histories, path_group, tangent_groups
 from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.traces import trace_levels
-from backdrive_bayes.mechanics.effect import Distortion, Effect, TangentEffect
+from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.reducer import TOP, ReducerClass, place_knots, spaced
 from backdrive_bayes.mechanics.registry import all_effects
@@ -52,6 +52,11 @@ class Search:
     modules: tuple[str, ...]
     fixed: tuple[Group, ...]
     only: tuple[str, ...] | None = None
+
+    @classmethod
+    def over(cls, reduced: Reduced, effects: tuple[Effect, ...], modules: tuple[str, ...]) -> Search:
+        """The search where every effect may act; what follows from the torque history is made once."""
+        return cls(reduced, effects, modules, tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)))
 
     def run(self, distortion: Distortion, steps: int, refine: bool = False, jitter: Jitter | None = None) -> Linear:
         """The linear model where the search ends from a distortion; ``refine`` adds knots and learns the jitter."""

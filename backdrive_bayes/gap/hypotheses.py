@@ -11,9 +11,8 @@ from scipy.special import logsumexp
 from backdrive_bayes.engine.contrasts import SIZES, Contrasts, averaged, effect_groups, make_contrasts
 from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
-from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group, with_wave
 from backdrive_bayes.engine.reduced import disturbance
 from backdrive_bayes.engine.traces import trace_levels, usual_level, wave_trace
@@ -97,9 +96,7 @@ def _level(table: _Table, names) -> float:
     log = {h: table.log_marginal(h) for h in singles}
     best = max(log, key=log.__getitem__)
     linear = with_wave(table.linear, table.frequency[best]) if ENCODER in best else table.linear
-    scales = linear.design.scales(levels(linear, best))
-    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
-    log_scale, solution = find_scales(linear.data, scales, start)
+    scales, log_scale, solution = learn_scales(linear, levels(linear, best))
     # The solution knows the frequency of a wave: what its search costs is not part of the level.
     return solution.log_marginal + linear.data.log_volume + scales.log_prior(log_scale) - log[best] - table.price.get(best, 0.0)
 

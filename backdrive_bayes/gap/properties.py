@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit, log_ndtr, logsumexp
 
-from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.probabilities import CALIBRATION, probabilities
@@ -111,15 +110,15 @@ def crossed_before(z, angle) -> np.ndarray:
     return found
 
 
-def slips(z, angle) -> np.ndarray:
+def slips(branches: Branches) -> np.ndarray:
     """Angle gained from every onset to full load beyond what the branch before the onset gives, (draws, onsets): its compliance
     there, and if that grows already, its growth (a body softens little by little)."""
     onset = np.array(ONSETS)
-    early, middle, there = (_at(z, angle, x) for x in (onset - BEFORE, onset - 0.5 * BEFORE, onset))
+    early, middle, there = (_at(branches.z, branches.loading, x) for x in (onset - BEFORE, onset - 0.5 * BEFORE, onset))
     compliance = (there - early) / BEFORE
     growth = np.maximum((there - 2.0 * middle + early) / (0.5 * BEFORE) ** 2, 0.0)
     left = 1.0 - onset
-    return angle[:, -1:] - there - compliance * left - 0.5 * growth * left * (left + BEFORE)
+    return branches.loading[:, -1:] - there - compliance * left - 0.5 * growth * left * (left + BEFORE)
 
 
 def unevenness(branches: Branches) -> np.ndarray:
@@ -157,7 +156,7 @@ def properties_of(branches: Branches, angle_scale_rad: float, torque_scale_nm: f
     # The difference of two branches is as uneven as both.
     twice = np.repeat(2.0 * uneven, TORQUES.size)
     second = crossed.reshape(crossed.shape[0], -1), np.tile(TORQUES, len(WIDTHS)), twice, OWN
-    slip = slips(branches.z, branches.loading), np.array(ONSETS), uneven[1], SOFTENING
+    slip = slips(branches), np.array(ONSETS), uneven[1], SOFTENING
     found = []
     for name, (sizes, torques, variance, own) in (("second_backlash", second), ("interface_slip", slip)):
         log_factor, best = present(sizes, variance, own)
@@ -171,9 +170,7 @@ def _beside_effects(weighed: Weighed) -> Linear:
     joint = probabilities(weighed.log_factor, weighed.left, {})
     best = max((h for h in joint if h in weighed.log_factor), key=lambda h: joint[h])
     linear = with_columns(weighed, best)
-    scales = linear.design.scales(levels(linear, best))
-    start = np.where(scales.free, [linear.log_scale[n] for n in linear.design.names], scales.mean)
-    return replace(linear, solution=find_scales(linear.data, scales, start)[1])
+    return replace(linear, solution=learn_scales(linear, levels(linear, best))[2])
 
 
 def _gain(mean, variance, large):

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from backdrive_bayes.engine.design import Design
+from backdrive_bayes.engine.levels import learn_scales
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import Scales, find_scales, whiten
+from backdrive_bayes.engine.marginal import whiten
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 
 RESAMPLED = 400
@@ -41,9 +42,7 @@ class Fitted:
 
 def fit_hypothesis(linear: Linear, effects, priors) -> Fitted:
     """Scales and weights of a hypothesis on all records."""
-    scales: Scales = linear.design.scales(priors)
-    start = np.array([linear.log_scale.get(n, priors[n][0]) for n in linear.design.names])
-    log_scale, solution = find_scales(linear.data, scales, np.where(scales.free, start, scales.mean))
+    scales, log_scale, solution = learn_scales(linear, priors)
     return Fitted(tuple(effects), linear, scales.of_weights(log_scale), solution.mean)
 
 

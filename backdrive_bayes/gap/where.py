@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.engine.design import path_group
-from backdrive_bayes.engine.levels import levels
+from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import find_scales
 from backdrive_bayes.mechanics.registry import UNKNOWN
 from backdrive_bayes.records.branches import cycle_numbers, find_segments
 
@@ -40,13 +39,10 @@ class Gap:
 def estimate_gap(linear: Linear, rng) -> Gap:
     """The process along each leg beside the clean class, all effects at trace level."""
     group = path_group(linear.reduced, UNKNOWN)
-    design = linear.design.joined(group)
-    priors = levels(linear, ()) | {UNKNOWN.name: (float(np.log(UNKNOWN.present(linear.reduced.context))), 2.0)}
-    data = linear.whitened(design)
-    scales = design.scales(priors)
-    start = np.array([linear.log_scale.get(n, priors[n][0]) for n in design.names])
-    _, solution = find_scales(data, scales, np.where(scales.free, start, scales.mean))
-    own = design.index == design.names.index(UNKNOWN.name)
+    usual = UNKNOWN.present(linear.reduced.context)
+    beside = linear.beside(group, usual)
+    solution = learn_scales(beside, levels(linear, ()) | {UNKNOWN.name: (float(np.log(usual)), 2.0)})[2]
+    own = beside.design.index == beside.design.names.index(UNKNOWN.name)
     noise = rng.standard_normal((solution.root.shape[1], 200)) * np.sqrt(solution.variance)
     scale, mean, error = linear.reduced.angle_scale_rad, [], []
     for r in range(len(linear.angles)):

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise, physical_reducer, simulate_unit
-from backdrive_bayes.engine.design import path_group
 from backdrive_bayes.engine.infer import library_terms
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.engine.search import STEPS, Search
 from backdrive_bayes.engine.wander import learn_wander
-from backdrive_bayes.mechanics.effect import Distortion, PathEffect
+from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import BASELINE
 
 SIZE, TIME = 1e-4, 0.1
@@ -26,8 +25,7 @@ def learnt(size: float):
         slow = BenchNoise(0.0, size, TIME * r.time_s[-1] / 2.5, 0.0)
         records.append(replace(r, angle_rad=r.angle_rad + angle_noise(r.time_s.size, r.time_s[1] - r.time_s[0], slow, rng)))
     reduced = reduce_unit(replace(unit, records=tuple(records)), 120)
-    fixed = tuple(path_group(reduced, e) for e in library_terms() if isinstance(e, PathEffect))
-    return learn_wander(Search(reduced, library_terms(), BASELINE, fixed).run(Distortion(), STEPS, refine=True))
+    return learn_wander(Search.over(reduced, library_terms(), BASELINE).run(Distortion(), STEPS, refine=True))
 
 
 def test_a_planted_wander_is_learnt_at_its_size_and_time():

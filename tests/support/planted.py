@@ -11,6 +11,8 @@ from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, angle_no
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.periodic import WAVE
+from backdrive_bayes.engine.search import Search
+from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.records.record import Record, Unit
 
 NOISE = BenchNoise()
@@ -88,6 +90,11 @@ def _delayed_square(record, time_s=3.0):
     return 2e-3 * lfilter([share], [1.0, share - 1.0], load)
 
 
+def stepped(size_rad):
+    """A clean unit but for a step of the reading halfway through the first record."""
+    return changed(_smooth(), lambda r, i: size_rad * (r.time_s > 0.55 * r.time_s[-1]) * (i == 0))
+
+
 UNITS = {
     "none": _smooth,
     "torque_offset": lambda: _smooth(offset_nm=8e-4),
@@ -96,8 +103,7 @@ UNITS = {
     "encoder_error": lambda: changed(_smooth(), lambda r, i: 4e-4 * np.cos(2 * np.pi * r.angle_rad / PERIOD_RAD)),
     "thermal_drift": lambda: changed(_smooth(loops=MORE), lambda r, i: 1.5e-3 * (r.time_s / 20) ** 0.7),
     "asymmetric_stiffness": lambda: changed(_smooth(), lambda r, i: 0.035 * np.abs(r.torque_nm)),
-    # A step of the reading halfway through the first record.
-    "unknown": lambda: changed(_smooth(), lambda r, i: 1.5e-3 * (r.time_s > 0.55 * r.time_s[-1]) * (i == 0)),
+    "unknown": lambda: stepped(1.5e-3),
     "second_backlash": lambda: _smooth((0.15, 0.25, 0.35)),
     "interface_slip": lambda: _smooth((0.1, 0.75, 1.0)),
 }
@@ -112,7 +118,7 @@ def prepared(name):
 
 def joint_mode(reduced, effects):
     """The first of the modes of ``linearise``; the others, of each bending effect alone, are not searched."""
-    return engine.joint_mode(reduced, effects)[0].without(WAVE)
+    return engine.joint_mode(Search.over(reduced, effects, BASELINE), engine.possible_starts(reduced))[0].without(WAVE)
 
 
 def _firmer(known, factor):
