@@ -110,7 +110,7 @@ class Posterior:
             if effect.name not in self.flat or not effect.of_reducer:
                 continue
             if isinstance(effect, PathEffect):
-                found = found + self.flat[effect.name] @ effect.responses(history, 0, self.context)[1].T
+                found = found + self.flat[effect.name] @ effect.responses(history, None, self.context)[1].T
             elif isinstance(effect, FlankEffect):
                 even = self.reducer.flank_columns(history, mean, growth, ends=True)
                 found = found + self.flat[effect.name] @ even.T

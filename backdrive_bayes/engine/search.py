@@ -32,7 +32,7 @@ LEARNINGS = 4
 STEPS = 14
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque; exponents fifty times as much."""
-LAW = "rate_dependent_friction"
+LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"
 BENDING = {
     "torque_offset": ("offset",),
     "sensor_lag": ("lag_s",),
@@ -45,7 +45,7 @@ WIDE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The search for a mode beside ``fixed`` columns; ``only`` these effects may act, all by default."""
+    """The search for a mode beside ``fixed`` columns; of what bends the prediction ``only`` these effects may act, all by default."""
 
     reduced: Reduced
     effects: tuple[Effect, ...]
@@ -130,10 +130,11 @@ class Search:
         return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean))
 
     def _acts(self, effect) -> bool:
-        """Whether an effect may be more than a trace: all at the joint mode, none that bends where ``only`` is empty."""
+        """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these that do."""
         if effect is BENCH_HYSTERESIS or self.only is None:
             return self.only is None and effect is not BENCH_HYSTERESIS
-        names = self.only or [n for n in all_effects() if n not in BENDING]
+        # A creep may stand for a law of the rate: where that acts, it is weighed without.
+        names = [n for n in all_effects() if n in self.only or n not in BENDING and not (n == CREEP and LAW in self.only)]
         return effect.name in {t.name for n in names for t in all_effects().get(n, ())}
 
     def _backward(self, linear) -> set[str]:

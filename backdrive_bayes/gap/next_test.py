@@ -71,7 +71,7 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
         if weight is None:
             continue
         if isinstance(effect, PathEffect):
-            columns = effect.responses(history, 0, context)[1]
+            columns = effect.responses(history, None, context)[1]
             angle = angle + columns @ weight[: columns.shape[1]]
         elif isinstance(effect, FlankEffect):
             angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight

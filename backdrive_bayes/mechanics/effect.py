@@ -66,8 +66,9 @@ class Effect:
 class PathEffect(Effect):
     """An effect whose columns follow from the torque history alone."""
 
-    def responses(self, history: History, record: int, context: Context) -> tuple[np.ndarray, np.ndarray]:
-        """Its columns at the beginning and the end of every segment, (segments, columns) each."""
+    def responses(self, history: History, record: int | None, context: Context) -> tuple[np.ndarray, np.ndarray]:
+        """Its columns at the beginning and the end of every segment, (segments, columns) each; ``record`` is the number of the
+        record whose history it is, None for a history that was not measured."""
         raise NotImplementedError
 
 

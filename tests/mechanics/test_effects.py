@@ -65,11 +65,16 @@ def weights(seed=3):
     return {n: np.linalg.solve(m, w) if (m := REDUCER.part(n).mixing) is not None else w for n, w in found.items()}
 
 
+def of_path(term):
+    """Which columns are not those of a single record among weights that all records share."""
+    return term.per_record | term.responses(cycle(), None, CONTEXT)[1].any(axis=0)
+
+
 def column(name, reduced, distortion=None):
     """The columns that a design holds for one term, by record."""
     distortion = distortion or LATE.get(name, Distortion())
     if isinstance(TERMS[name], PathEffect):
-        return path_group(reduced, TERMS[name]).columns
+        return [c[:, of_path(TERMS[name])] for c in path_group(reduced, TERMS[name]).columns]
     core = class_groups(reduced, REDUCER, distortion)
     return tangent_groups(reduced, REDUCER, core, distortion, weights(), (TERMS[name],))[0].columns
 
@@ -135,6 +140,19 @@ def test_creep_vanishes_where_the_torque_is_slow_and_holds_where_it_is_fast():
     assert slow < 0.02 * fast
 
 
+def test_a_creep_in_progress_is_held_by_its_record_alone():
+    """An element that was loaded before the record relaxes."""
+    creep, history = TERMS["viscoelastic_creep"], cycle()
+    relaxing = 0.7 * np.exp((history.t0[0] - history.t1) / (3.0 * creep.times_s(CONTEXT)[3]))
+
+    def left(columns):
+        return np.std(relaxing - columns @ np.linalg.lstsq(columns, relaxing, rcond=None)[0]) / np.std(relaxing)
+
+    path, own, other = (creep.responses(history, record, CONTEXT)[1] for record in (None, 1, 2))
+    assert left(own) < 0.03 < 0.3 < left(path)
+    assert np.array_equal(own.any(axis=0) & other.any(axis=0), path.any(axis=0)) and own.any(axis=0).sum() > path.any(axis=0).sum()
+
+
 def test_the_lag_grows_with_the_rate_and_exponents_with_its_logarithm():
     here = column("sensor_lag", unit())
     np.testing.assert_allclose(here[2][5:25], 10 * here[0][5:25], rtol=0.05, atol=0.02 * np.abs(here[2]).max())
@@ -161,7 +179,8 @@ def test_a_record_has_the_same_columns_alone_and_among_others(name):
     term = TERMS[name]
     if isinstance(term, PathEffect):
         both, alone = unit(), SimpleNamespace(**(vars(unit()) | {"blocks": unit().blocks[1:]}))
-        assert np.array_equal(path_group(both, term).columns[1], path_group(alone, term).columns[0])
+        one, other = (path_group(u, term).columns[k][:, of_path(term)] for u, k in ((both, 1), (alone, 0)))
+        assert np.array_equal(one, other)
     elif not isinstance(term, GrowthEffect):
         both, alone = column(name, unit()), column(name, unit(rates=RATES[2:]))
         np.testing.assert_allclose(alone[0], both[2], atol=1e-9 * np.abs(both[2]).max())

@@ -10,11 +10,14 @@ from backdrive_bayes.mechanics.history import played
 TIMES = 8
 FRICTION = 0.04
 """Threshold of the play through which half of the columns see the torque: creep behind friction."""
+BEFORE = 0.2
+"""Standard deviation of an element's state at the beginning of a record, in the angle that it would turn at the largest torque."""
 
 
 class ViscoelasticCreep(PathEffect):
     """Kelvin-Voigt elements over a range of time constants, driven by the torque, by the torque behind friction and, as creep
-    that grows faster than the load (Schapery, Polym. Eng. Sci. 9, 1969), by its square."""
+    that grows faster than the load (Schapery, Polym. Eng. Sci. 9, 1969), by its square; and in each record by itself what is left
+    of the load before it."""
 
     def present(self, context):
         """Three per cent of the angle scale."""
@@ -36,14 +39,20 @@ class ViscoelasticCreep(PathEffect):
                 a, b = _delayed(z0, z1, span, time)
                 begin.append(a - z0)
                 end.append(b - z1)
-        mixing = _mixing(np.log(times))
+        for own in range(context.rate.size):
+            for time in times[::2]:
+                begin.append((own == record) * np.exp((history.t0[0] - history.t0) / time))
+                end.append((own == record) * np.exp((history.t0[0] - history.t1) / time))
+        mixing = _mixing(np.log(times), context.rate.size)
         return np.stack(begin, axis=1) @ mixing, np.stack(end, axis=1) @ mixing
 
 
-def _mixing(log_times):
+def _mixing(log_times, records):
     near = np.exp(-np.abs(log_times[:, None] - log_times) / 1.5)
     fewer = np.linalg.cholesky(0.5 * near[::2, ::2])
-    return block_diag(np.linalg.cholesky(near), fewer, fewer)
+    # One load came before all of them.
+    before = np.linalg.cholesky(BEFORE**2 * near[::2, ::2] ** 0.25)
+    return block_diag(np.linalg.cholesky(near), fewer, fewer, *[before] * records)
 
 
 @numba.njit(cache=True, nogil=True)
