@@ -45,7 +45,7 @@ WIDE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The search for a mode beside ``fixed`` columns; of what bends the prediction ``only`` these effects may act, all by default."""
+    """The search for a mode beside ``fixed`` columns; of what bends the prediction ``only`` these may act, all by default."""
 
     reduced: Reduced
     effects: tuple[Effect, ...]
@@ -130,7 +130,7 @@ class Search:
         return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean))
 
     def _acts(self, effect) -> bool:
-        """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these that do."""
+        """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these."""
         if effect is BENCH_HYSTERESIS or self.only is None:
             return self.only is None and effect is not BENCH_HYSTERESIS
         # A creep may stand for a law of the rate: where that acts, it is weighed without.

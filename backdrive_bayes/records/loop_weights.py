@@ -109,7 +109,8 @@ def _tip_weights(record: Record, segments, edge: int) -> np.ndarray:
 
 
 def _both_widths(record: Record, segments, k: int) -> np.ndarray | None:
-    """Weights (2, samples) of the width between ramps k and k + 1 at zero torque, over a short window and one twice as long."""
+    """Weights (3, samples) of the width between ramps k and k + 1 at zero torque: over a short window, over one twice as long,
+    and over the short one where the torque is taken as straight over half the time only."""
     before, after = (_zero_weights(record, segments[j]) for j in (k, k + 1))
     if before is None or after is None:
         return None
@@ -117,24 +118,30 @@ def _both_widths(record: Record, segments, k: int) -> np.ndarray | None:
 
 
 def _zero_weights(record: Record, segment) -> np.ndarray | None:
-    """Weights (2, samples) that read the angle at zero torque on one ramp, None where the ramp does not pass it."""
+    """Weights (3, samples) that read the angle at zero torque on one ramp, None where the ramp does not pass it."""
     torque = segment.direction * record.torque_nm[segment.start : segment.stop]
     time = record.time_s[segment.start : segment.stop]
     crossing, count = _crossing(torque), len(torque)
     reach = _zero_reach(count)
     windows = [_about(crossing, times * reach, count) for times in (1, 2)]
     # The torque is a straight ramp over more samples than the angle is: its zero is known better than they tell.
-    wide = _about(crossing, max(int(RAMP_SHARE * count), 2 * reach), count)
+    ramp = max(int(RAMP_SHARE * count), 2 * reach)
+    at, closely = (_instant(time[w], torque[w]) for w in (_about(crossing, n, count) for n in (ramp, ramp // 2)))
     if windows[0].stop - windows[0].start < _LEAST // 2:
         return None
-    origin = time[wide].mean()
-    slope, level = np.polyfit(time[wide] - origin, torque[wide], 1)
-    at = origin - level / slope if slope > 0.0 else np.inf
     length = time[windows[1]][-1] - time[windows[1]][0]
     if not time[windows[1]][0] - length <= at <= time[windows[1]][-1] + length:
         return None
-    spans = [slice(segment.start + w.start, segment.start + w.stop) for w in windows]
-    return np.stack([_line_weights(record, span, at) for span in spans])
+    # Of a torque that rests at zero half the time tells nothing.
+    closely = closely if abs(closely - at) <= length else at
+    short, long = (slice(segment.start + w.start, segment.start + w.stop) for w in windows)
+    return np.stack([_line_weights(record, span, t) for span, t in ((short, at), (long, at), (short, closely))])
+
+
+def _instant(time, torque) -> float:
+    """Time [s] at which the straight line through a rising torque passes zero, infinite where it does not rise."""
+    slope, level = np.polyfit(time - time.mean(), torque, 1)
+    return float(time.mean() - level / slope) if slope > 0.0 else np.inf
 
 
 def zero_torque_nm(record: Record, segment) -> float:

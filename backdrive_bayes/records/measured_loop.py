@@ -91,13 +91,15 @@ def _mean(parts) -> dict[str, np.ndarray]:
 
 
 def _width(record: Record, found, weights, noise) -> tuple[float | None, float | None]:
-    """Mean width at zero torque and its standard error; what a window twice as long changes is an error of its own."""
+    """Mean width at zero torque and its standard error; what a window twice as long changes is an error of its own, and so is
+    what a straight torque over half the time changes."""
     if weights is None:
         return None, None
-    short, long = weights @ record.angle_rad
+    short, long, closely = weights @ record.angle_rad
     ramp = 2.0 * RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0]) / 2.0
     torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(found.starts)))
-    return float(short), float(np.sqrt(_angle_error(record, weights[0], noise) ** 2 + torque**2 + (long - short) ** 2))
+    errors = [_angle_error(record, weights[0], noise), torque, long - short, closely - short]
+    return float(short), float(np.linalg.norm(errors))
 
 
 def _angle_error(record: Record, weights: np.ndarray, noise: NoiseEstimate) -> float:

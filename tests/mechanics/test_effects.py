@@ -150,7 +150,8 @@ def test_a_creep_in_progress_is_held_by_its_record_alone():
 
     path, own, other = (creep.responses(history, record, CONTEXT)[1] for record in (None, 1, 2))
     assert left(own) < 0.03 < 0.3 < left(path)
-    assert np.array_equal(own.any(axis=0) & other.any(axis=0), path.any(axis=0)) and own.any(axis=0).sum() > path.any(axis=0).sum()
+    acting, elsewhere, always = (columns.any(axis=0) for columns in (own, other, path))
+    assert np.array_equal(acting & elsewhere, always) and acting.sum() > always.sum()
 
 
 def test_the_lag_grows_with_the_rate_and_exponents_with_its_logarithm():

@@ -11,7 +11,7 @@ TIMES = 8
 FRICTION = 0.04
 """Threshold of the play through which half of the columns see the torque: creep behind friction."""
 BEFORE = 0.2
-"""Standard deviation of an element's state at the beginning of a record, in the angle that it would turn at the largest torque."""
+"""Standard deviation of an element's state at the beginning of a record, in shares of its angle at the largest torque."""
 
 
 class ViscoelasticCreep(PathEffect):
