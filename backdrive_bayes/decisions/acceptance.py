@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -283,8 +283,3 @@ def _unusable(structure: Structure) -> str:
     if convergence.get("contradictions"):
         return "Check the records: the posterior contradicts what was measured, so the model does not fit these data."
     return "Check the records, and leave out those that differ most from the others: the sampling does not converge on them."
-
-
-def with_risk(limits: Limits, consumer: float | None = None, producer: float | None = None) -> Limits:
-    """The same limits with other agreed risks."""
-    return replace(limits, consumer=consumer or limits.consumer, producer=producer or limits.producer)

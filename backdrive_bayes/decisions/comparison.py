@@ -14,6 +14,7 @@ from backdrive_bayes.decisions.loops import Loop, NotAvailable
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import UNITS
+from backdrive_bayes.indicators.intervals import central
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 from backdrive_bayes.results import COMPARISON
 
@@ -143,10 +144,10 @@ def contrast(first, second, rope: float, level: float, rng) -> dict:
     )
     inside, above = share(equivalent), share(~equivalent & (difference > 0))
     return {
-        "first": _interval(first, level),
-        "second": _interval(second, level),
-        "difference": _interval(difference, level),
-        "ratio": None if ratio is None else _interval(ratio, level),
+        "first": central(first, level),
+        "second": central(second, level),
+        "difference": central(difference, level),
+        "ratio": None if ratio is None else central(ratio, level),
         "probability_first_greater": float(np.clip(greater, 0.5 / (x.size + 1), 1 - 0.5 / (x.size + 1))),
         "probability_equivalent": inside,
         "probability_clearly_greater": above,
@@ -193,11 +194,6 @@ def _mechanism(evidence: Evidence, name: str, level: float) -> dict:
     for loop in evidence.measured:
         values = {key: evidence.draws.values(key, loop.rate, loop.amplitude) for key in MECHANISM}
         values["rest_over_S"] = 1 - values["S_g_over_S"] - values["S_f_over_S"]
-        shown = {k: None if np.isnan(v).any() else _interval(v, level) for k, v in values.items()}
+        shown = {k: None if np.isnan(v).any() else central(v, level) for k, v in values.items()}
         rows.append({"loading_rate_Nm_per_s": loop.rate, "amplitude_Nm": loop.amplitude} | shown)
     return {"unit": name, "records": rows}
-
-
-def _interval(values, level):
-    lo, median, hi = np.quantile(values, [0.5 - level / 2, 0.5, 0.5 + level / 2])
-    return {"median": float(median), "lo": float(lo), "hi": float(hi)}

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy import stats
-from scipy.optimize import brentq
 
 SHAPES = ("normal", "lognormal", "gamma")
 NODES, PIECES = 40, 24
@@ -73,18 +72,6 @@ def global_risks(process: Process, uncertainty: float, limit, accepted, rejected
         _mass(inside + outside, process, uncertainty, accepted),
         _mass(inside + outside, process, uncertainty, rejected_outside, complement=True),
     )
-
-
-def guarded_limit(process: Process, uncertainty: float, limit, target: float) -> tuple[float, float]:
-    """The acceptance interval, both sides moved alike, whose global consumer's risk is ``target``. JCGM 106:2012, 9.5.4."""
-    lo, hi = limit
-
-    def excess(guard):
-        return global_risks(process, uncertainty, limit, (lo + guard, hi - guard)).consumer - target
-
-    widest = 0.5 * (hi - lo) * (1 - 1e-9) if np.isfinite(lo) and np.isfinite(hi) else REACH * uncertainty
-    guard = brentq(excess, -REACH * uncertainty, widest)
-    return lo + guard, hi - guard
 
 
 def process_of_batch(estimates, uncertainties) -> Process:

@@ -14,16 +14,8 @@ SHORTEST_RUN = 1e-4
 """Least step of the torque over which a slope is taken, in the range of the torque."""
 
 
-def block_covariance(blocks: Blocks, noise: NoiseEstimate, slope_rad_per_nm=0.0) -> np.ndarray:
-    """Covariance of the block means of the angle [rad²], shape (blocks, blocks).
-
-    The torque path's error, of each block and of its leg as a whole, enters through ``slope_rad_per_nm`` (blocks,).
-    """
-    return channel_covariance(blocks, noise) + path_covariance(blocks, slope_rad_per_nm)
-
-
 def channel_covariance(blocks: Blocks, noise: NoiseEstimate) -> np.ndarray:
-    """The angle channel's part of it.
+    """Covariance of the block means of the angle [rad²], (blocks, blocks), from the angle channel.
 
     The correlated part is the mean of σ² exp(-|t-t'|/t_c) over all pairs of samples of two blocks, as geometric sums; the white
     part falls with the number of samples. A corrected mean carries part of its correction as error.

@@ -59,8 +59,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     """The joint model's mode and modes of what bends the prediction.
 
     Whatever cannot be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own:
-    one where none of them acts, and those of each and of each pair alone. A hypothesis is weighed about the mode where it is
-    likeliest.
+    one where none of them acts, and those of each and of each pair without the others. A hypothesis is weighed about the mode
+    where it is likeliest.
     """
     free, starts = Search.over(reduced, effects, modules), possible_starts(reduced)
     joint, waves = joint_mode(free, starts)

@@ -79,7 +79,10 @@ class Posterior:
 
     def thinned(self, most: int) -> Posterior:
         """At most ``most`` draws of each chain, evenly taken."""
-        keep = np.linspace(0, self.shape[1] - 1, min(most, self.shape[1])).astype(int)
+        return self.taken(np.linspace(0, self.shape[1] - 1, min(most, self.shape[1])).astype(int))
+
+    def taken(self, keep) -> Posterior:
+        """The draws ``keep`` of each chain, numbers or a slice."""
         return replace(
             self,
             weights={n: w[:, keep] for n, w in self.weights.items()},

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from backdrive_bayes.engine.one_thread import one_thread
@@ -40,7 +38,7 @@ def predict_angles(posterior: Posterior, time_s, torque_nm, start: str = "unknow
     offsets = np.array(block_offsets(posterior))
     curves = []
     for i, preload in enumerate(preloads):
-        part = _part(some, i, len(preloads))
+        part = some.taken(slice(i, None, len(preloads)))
         if part.shape[1]:
             angle = _from(part, time, torque, rate, preload * posterior.context.torque_scale_nm)
             curves.append(angle + np.resize(np.roll(offsets, i), len(angle))[:, None])
@@ -92,15 +90,6 @@ def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:
         return ""
     measured = f"the only one measured, {high:.3g} N·m/s" if lone else f"those measured, {low:.3g} to {high:.3g} N·m/s"
     return f"the loading rate of {rate:.3g} N·m/s is far from {measured}: what it does to the angle is extrapolated"
-
-
-def _part(posterior, first, step):
-    return replace(
-        posterior,
-        weights={n: w[:, first::step] for n, w in posterior.weights.items()},
-        log_scale={n: s[:, first::step] for n, s in posterior.log_scale.items()},
-        log_density=posterior.log_density[:, first::step],
-    )
 
 
 def _from(posterior, time, torque, rate, preload_nm):

@@ -71,6 +71,11 @@ class BlockMeans:
         return tuple(found)
 
     @cached_property
+    def spans_nm(self) -> tuple[np.ndarray, ...]:
+        """Torque that each block spans [N·m], (blocks,) for each record; none where it does not count."""
+        return tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * own for b, own in zip(self.blocks, self.settled, strict=True))
+
+    @cached_property
     def context(self) -> Context:
         """Rates, durations and noise levels."""
         duration = np.array([b.end_s[-1] - b.begin_s[0] for b in self.blocks])

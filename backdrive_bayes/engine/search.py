@@ -132,10 +132,10 @@ class Search:
     def _acts(self, effect) -> bool:
         """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these."""
         if effect is BENCH_HYSTERESIS or self.only is None:
-            return self.only is None and effect is not BENCH_HYSTERESIS
+            return effect is not BENCH_HYSTERESIS
         # A creep may stand for a law of the rate: where that acts, it is weighed without.
-        names = [n for n in all_effects() if n in self.only or n not in BENDING and not (n == CREEP and LAW in self.only)]
-        return effect.name in {t.name for n in names for t in all_effects().get(n, ())}
+        still = {*BENDING, CREEP} if LAW in self.only else {*BENDING}
+        return effect in {t for n, terms in all_effects().items() if n in self.only or n not in still for t in terms}
 
     def _backward(self, linear) -> set[str]:
         """Effects that are one way and want to act the other way: they stay traces from then on."""

@@ -15,8 +15,9 @@ from backdrive_bayes.gap import next_test, probabilities, where
 from backdrive_bayes.gap.averaged import posterior_of
 from backdrive_bayes.gap.examine import LEVEL, Found, examine
 from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed
-from backdrive_bayes.gap.parameters import effect_parameters, interval
+from backdrive_bayes.gap.parameters import effect_parameters
 from backdrive_bayes.indicators.draws import IndicatorDraws
+from backdrive_bayes.indicators.intervals import central
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.mechanics.registry import all_effects
 from backdrive_bayes.records.check import check_unit
@@ -123,7 +124,7 @@ def _shrink(found: Found, none, posterior):
         loop = IndicatorDraws(drawn, found.k), drawn.records.rate_nm_per_s[widest], drawn.records.amplitude_nm[widest]
         for name in SHOWN:
             values = loop[0].values(name, *loop[1:])
-            change.setdefault(name, {})[key] = interval(values, LEVEL) if np.isfinite(values).all() else None
+            change.setdefault(name, {})[key] = central(values, LEVEL) if np.isfinite(values).all() else None
     return {
         "held_out": "records left out in turn" if len(posterior.records.names) > 1 else "legs left out in turn",
         **_rms(shrunk),
@@ -179,7 +180,7 @@ def _shifts(before: Posterior, after: Posterior) -> list[dict]:
         sd = max(float(np.std(values)), 1e-300)
         rows.append({
             "parameter": name, "unit": units[name],
-            "before": interval(values, LEVEL), "after": interval(new[name], LEVEL),
+            "before": central(values, LEVEL), "after": central(new[name], LEVEL),
             "shift_sd": float((np.median(new[name]) - np.median(values)) / sd),
         })  # fmt: skip
     return rows

@@ -6,6 +6,7 @@ import numpy as np
 
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed
+from backdrive_bayes.indicators.intervals import central
 from backdrive_bayes.mechanics.effect import PathEffect, TangentEffect
 from backdrive_bayes.mechanics.registry import all_effects
 
@@ -15,7 +16,7 @@ def effect_parameters(weighed: Weighed, properties, posterior: Posterior, effect
     for found in properties:
         if found.name == effect:
             place = {"median": found.torque_nm, "lo": found.torque_nm, "hi": found.torque_nm, "unit": "N·m"}
-            return {"angle": interval(found.size_rad, level) | {"unit": "rad"}, "torque": place}
+            return {"angle": central(found.size_rad, level) | {"unit": "rad"}, "torque": place}
     if effect == STICK_SLIP:
         size = weighed.jumps.size_rad
         return {"jump": {"median": size, "lo": size, "hi": size, "unit": "rad"}}
@@ -34,18 +35,12 @@ def _of_terms(weighed, posterior, effect, level):
         weights = posterior.flat[term.name]
         if isinstance(term, TangentEffect):
             factor = context.torque_scale_nm if term.unit == "N·m" else 1.0
-            rows[term.parameter] = interval(weights[:, 0] * factor, level) | {"unit": term.unit}
+            rows[term.parameter] = central(weights[:, 0] * factor, level) | {"unit": term.unit}
         elif isinstance(term, PathEffect):
             design = weighed.of(posterior.hypothesis).design
             group = design.group(term.name)
             columns = np.vstack([group.of_record(r) for r in range(len(group.columns))])
             columns = columns - columns.mean(axis=0)
             size = np.sqrt(np.mean((weights @ columns.T) ** 2, axis=1)) * context.angle_scale_rad
-            rows[f"{term.name}_rms"] = interval(size, level) | {"unit": "rad"}
+            rows[f"{term.name}_rms"] = central(size, level) | {"unit": "rad"}
     return rows
-
-
-def interval(values, level: float) -> dict:
-    """Median and central interval of draws."""
-    lo, median, hi = np.quantile(values, [0.5 - level / 2, 0.5, 0.5 + level / 2])
-    return {"median": float(median), "lo": float(lo), "hi": float(hi)}

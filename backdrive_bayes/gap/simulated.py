@@ -13,10 +13,10 @@ from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities, where
 from backdrive_bayes.gap.diagnose import SHOWN, Diagnosis, diagnose
 from backdrive_bayes.gap.examine import LEVEL
-from backdrive_bayes.gap.parameters import interval
 from backdrive_bayes.gap.simulator import Simulator, effects_of, read_simulator, require_reach
 from backdrive_bayes.gap.split import PARTS, STAGES, Split
 from backdrive_bayes.indicators.draws import IndicatorDraws
+from backdrive_bayes.indicators.intervals import central
 from backdrive_bayes.number_text import per_cent_text
 from backdrive_bayes.records.record import Unit
 
@@ -135,10 +135,10 @@ def parameters(simulated: Posterior, measured: Posterior) -> list[dict]:
     rng = np.random.default_rng([measured.seed, 11])
     for p in (p for p in PARAMETERS if p.name in old and p.name in new):
         change = new[p.name] - rng.choice(old[p.name], new[p.name].size)
-        moved = interval(change, LEVEL)
+        moved = central(change, LEVEL)
         rows.append({
             "name": p.name, "unit": p.unit, "simulated": float(np.median(old[p.name])),
-            "simulated_interval": interval(old[p.name], LEVEL), "measured": interval(new[p.name], LEVEL),
+            "simulated_interval": central(old[p.name], LEVEL), "measured": central(new[p.name], LEVEL),
             "change": moved, "credible": bool(moved["lo"] * moved["hi"] > 0),
         })  # fmt: skip
     return rows
@@ -184,7 +184,7 @@ def _shrink(split, found, k):
     for key, posterior in (("before", split.simulator.posterior), ("after", found.posterior)):
         for name in SHOWN:
             values = IndicatorDraws(posterior, k).values(name, *loop)
-            change.setdefault(name, {})[key] = interval(values, LEVEL) if np.isfinite(values).all() else None
+            change.setdefault(name, {})[key] = central(values, LEVEL) if np.isfinite(values).all() else None
     return found.json["shrink"] | rms() | {
         "closed_fraction": split.shares(LEVEL)["both"],
         "records": [

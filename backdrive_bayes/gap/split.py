@@ -57,12 +57,6 @@ class Split:
         return [own - other for own, other in zip(reduced.angles, angles, strict=True)]
 
     @cached_property
-    def weight(self) -> tuple[np.ndarray, ...]:
-        """Torque that each block spans [N·m], none before the first reversal."""
-        both = zip(self.linear.reduced.blocks, self.linear.reduced.settled, strict=True)
-        return tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * settled for b, settled in both)
-
-    @cached_property
     def fits(self) -> tuple[Fitted, Fitted]:
         """The unit's class with the shared effects and not a trace of those that the simulator lacks, and with these beside."""
         more = tuple(sorted({*self.shared, *self.lacking} - {"unknown"}))
@@ -73,11 +67,11 @@ class Split:
     def held_out(self) -> dict[str, Shrink]:
         """Held-out squares by stage, each in the place of ``after`` with the simulator as it is in that of ``before``."""
         rng = np.random.default_rng([self.seed, 12])
-        tuned = shrink(*self.fits, self.weight, rng)
+        tuned = shrink(*self.fits, self.linear.reduced.spans_nm, rng)
         group = min(self.linear.design.groups, key=lambda g: g.width)
         alone = replace(self.linear, angles=tuple(self.gap), design=Design((group,)))
         nothing = Fitted((), alone, np.zeros(group.width), np.zeros(group.width))
-        bare = shrink(nothing, nothing, self.weight, rng).before
+        bare = shrink(nothing, nothing, self.linear.reduced.spans_nm, rng).before
         after = {"simulated": bare, "retuned": tuned.before, "explained": tuned.after}
         return {stage: replace(tuned, before=bare, after=values) for stage, values in after.items()}
 
@@ -123,8 +117,9 @@ class Split:
         found = {}
         for name, (first, second) in steps.items():
             values = first if second is None else [a - b for a, b in zip(first, second, strict=True)]
-            mean = tuple(scale * (v - np.average(v, weights=w)) for v, w in zip(values, self.weight, strict=True))
-            found[name] = Gap(mean, error, self.weight, noise)
+            spans = self.linear.reduced.spans_nm
+            mean = tuple(scale * (v - np.average(v, weights=w)) for v, w in zip(values, spans, strict=True))
+            found[name] = Gap(mean, error, spans, noise)
         return found
 
 

@@ -50,9 +50,7 @@ def estimate_gap(linear: Linear, rng) -> Gap:
         columns = columns - columns.mean(axis=0)
         mean.append(columns @ solution.mean[own])
         error.append(columns @ (solution.root[own] @ noise))
-    # Before the first tip the past decides, and no effect can be told from it.
-    both = zip(linear.reduced.blocks, linear.reduced.settled, strict=True)
-    weight = tuple(np.abs(np.diff(b.edges_nm(), axis=0))[0] * settled for b, settled in both)
+    weight = linear.reduced.spans_nm
     variance = [np.diag(c) for c in linear.covariances]
     floor = sum(w @ v for w, v in zip(weight, variance, strict=True)) / sum(w.sum() for w in weight)
     return Gap(tuple(mean), tuple(error), weight, float(np.sqrt(floor)) * scale)

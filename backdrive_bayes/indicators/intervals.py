@@ -23,9 +23,14 @@ def bands(values, level: float = LEVEL) -> dict[str, list[float]]:
     return {"median": median.tolist(), "lo": lo.tolist(), "hi": hi.tolist()}
 
 
+def central(values, level: float = LEVEL) -> dict[str, float]:
+    """Median and central interval of ``values`` (draws,)."""
+    return named(*np.quantile(values, ends(level)))
+
+
 def interval(values, level: float = LEVEL) -> dict | None:
-    """Median and central interval of ``values`` (draws,); None where the quantity is not defined."""
-    return None if np.isnan(values).all() else named(*np.quantile(values, ends(level)))
+    """The same; None where the quantity is not defined."""
+    return None if np.isnan(values).all() else central(values, level)
 
 
 def over_positions(area, ratio, level: float = LEVEL) -> dict:

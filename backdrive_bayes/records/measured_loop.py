@@ -22,9 +22,11 @@ from backdrive_bayes.records.record import Record, Unit
 class MeasuredLoop:
     """A record's mean cycle as measured: area ∮τ dθ [J], half the angle between the tips [rad], width at zero torque [rad].
 
-    ``_sd`` are standard errors from the channels' noise. ``basis`` is 'settled' (tip to same tip, the mean of ``cycles`` of
-    them, a linear drift of ``drift_rad`` per cycle taken out) or 'first' (0 to +T to -T to 0, the first loading in it). The
-    width is None where the cycle does not reach zero torque on both branches; it is the mean over torques up to ``zero_nm``.
+    ``_sd`` are standard errors from the channels' noise, from gaps and tips between samples, and for the width from how much it
+    depends on what is taken as straight (noise counts there once more: rather too large than too small). ``basis`` is 'settled'
+    (tip to same tip, the mean of ``cycles`` of them, a linear drift of ``drift_rad`` per cycle taken out) or 'first' (0 to +T
+    to -T to 0, the first loading in it). The width is None where the cycle does not reach zero torque on both branches; it is
+    the mean over torques up to ``zero_nm``.
     """
 
     record: str
@@ -96,7 +98,7 @@ def _width(record: Record, found, weights, noise) -> tuple[float | None, float |
     if weights is None:
         return None, None
     short, long, closely = weights @ record.angle_rad
-    ramp = 2.0 * RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0]) / 2.0
+    ramp = RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0])
     torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(found.starts)))
     errors = [_angle_error(record, weights[0], noise), torque, long - short, closely - short]
     return float(short), float(np.linalg.norm(errors))

@@ -17,11 +17,12 @@ import numpy as np
 
 import backdrive_bayes.schemas
 from backdrive_bayes.commands.main import VERBS, main
-from backdrive_bayes.engine import diagnostics, infer, linearise, parameters, prediction, sample, traces
+from backdrive_bayes.engine import covariance, diagnostics, infer, linearise, parameters, prediction, reduced, sample, traces
 from backdrive_bayes.gap import examine, probabilities, properties, shrink
 from backdrive_bayes.indicators import same_loop
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import reducer
+from backdrive_bayes.mechanics.effects import viscoelastic_creep
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records import lines
 
@@ -55,6 +56,11 @@ NUMBERS = {
     "usual_line": f"{lines.USUAL:g}",
     "highest_line": f"{lines.HIGHEST:g}",
     "above": f"{traces.ABOVE:g}",
+    "creep_times": str(viscoelastic_creep.TIMES),
+    "creep_before": f"{viscoelastic_creep.BEFORE:g}",
+    "unread": f"{reduced.UNREAD:g}",
+    "unread_length": f"{reduced.UNREAD_LENGTH:g}",
+    "bend_error": f"{covariance.BEND_ERROR:g}",
     "trace": f"{traces.TRACE:g}",
 }
 """Constants of the code that the pages name."""

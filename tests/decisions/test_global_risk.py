@@ -5,13 +5,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import dblquad
+from scipy.optimize import brentq
 from scipy.stats import norm
 
-from backdrive_bayes.decisions.global_risk import Process, global_risks, guarded_limit, process_of_batch
+from backdrive_bayes.decisions.global_risk import Process, global_risks, process_of_batch
 
 INF = np.inf
 BEARING = Process(1.0, 0.5, "gamma")
 """JCGM 106:2012, 9.5.4: radial error motion of ball bearings, gamma with mean 1 µm and sd 0.5 µm; limit 2 µm, u = 0.25 µm."""
+
+
+def guarded_limit(process, uncertainty, limit, target):
+    """The acceptance interval, both sides moved alike, whose global consumer's risk is ``target``. JCGM 106:2012, 9.5.4."""
+    lo, hi = limit
+
+    def excess(guard):
+        return global_risks(process, uncertainty, limit, (lo + guard, hi - guard)).consumer - target
+
+    widest = 0.5 * (hi - lo) * (1 - 1e-9) if np.isfinite(lo) and np.isfinite(hi) else 9.0 * uncertainty
+    guard = brentq(excess, -9.0 * uncertainty, widest)
+    return lo + guard, hi - guard
 
 
 def test_the_ball_bearings_of_9_5_4():

@@ -7,7 +7,7 @@ import pytest
 from support.bench import block_means, even_blocks, known_estimate, noise_paths, path_of, raw_covariance
 
 from backdrive_bayes.bench.known_truth import BenchNoise
-from backdrive_bayes.engine.covariance import BEND_ERROR, block_covariance, local_slope, whitener
+from backdrive_bayes.engine.covariance import BEND_ERROR, channel_covariance, local_slope, path_covariance, whitener
 from backdrive_bayes.records.reduction import Blocks
 
 NOISE = BenchNoise(white_rad=3e-5, correlated_rad=7e-5, correlation_time_s=0.03)
@@ -38,6 +38,11 @@ def relative_gap(a, b):
     """Largest entry of the difference in units of the standard deviations."""
     sd = np.sqrt(np.diag(b))
     return np.abs((a - b) / np.outer(sd, sd)).max()
+
+
+def block_covariance(blocks, noise, slope_rad_per_nm=0.0):
+    """Both channels' parts."""
+    return channel_covariance(blocks, noise) + path_covariance(blocks, slope_rad_per_nm)
 
 
 def test_block_covariance_is_the_average_of_the_kernel():

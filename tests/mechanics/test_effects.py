@@ -20,6 +20,7 @@ from backdrive_bayes.mechanics.effect import (
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import SIZE as BENCH_FRICTION
+from backdrive_bayes.mechanics.effects.viscoelastic_creep import BEFORE
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
 from backdrive_bayes.records.reduction import Blocks
@@ -152,6 +153,13 @@ def test_a_creep_in_progress_is_held_by_its_record_alone():
     assert left(own) < 0.03 < 0.3 < left(path)
     acting, elsewhere, always = (columns.any(axis=0) for columns in (own, other, path))
     assert np.array_equal(acting & elsewhere, always) and acting.sum() > always.sum()
+    # Independent weights of these columns give states of one size at all times, alike where the times are.
+    decays = np.exp((history.t0[0] - history.t1)[:, None] / creep.times_s(CONTEXT)[::2])
+    root = np.linalg.lstsq(decays, own[:, acting & ~always], rcond=None)[0]
+    states = root @ root.T
+    np.testing.assert_allclose(np.diag(states), BEFORE**2, rtol=1e-6)
+    alike = states / BEFORE**2
+    assert 0.3 < alike[0, 3] < alike[0, 2] < alike[0, 1] < 0.95
 
 
 def test_the_lag_grows_with_the_rate_and_exponents_with_its_logarithm():

@@ -8,10 +8,13 @@ from backdrive_bayes.mechanics.effect import PathEffect
 from backdrive_bayes.mechanics.history import played
 
 TIMES = 8
+ALIKE, ALIKE_BEFORE = 1.5, 6.0
+"""Distances in ln of the time constant over which elements are alike, and over which their states at a record's beginning are."""
 FRICTION = 0.04
-"""Threshold of the play through which half of the columns see the torque: creep behind friction."""
+"""Threshold of the play through which some of the columns see the torque: creep behind friction."""
 BEFORE = 0.2
-"""Standard deviation of an element's state at the beginning of a record, in shares of its angle at the largest torque."""
+"""Standard deviation of a state at the beginning of a record, in that of an element's angle at the largest torque: the state is
+not tied to the element's own angle, or the model would not be linear."""
 
 
 class ViscoelasticCreep(PathEffect):
@@ -39,20 +42,23 @@ class ViscoelasticCreep(PathEffect):
                 a, b = _delayed(z0, z1, span, time)
                 begin.append(a - z0)
                 end.append(b - z1)
-        for own in range(context.rate.size):
-            for time in times[::2]:
-                begin.append((own == record) * np.exp((history.t0[0] - history.t0) / time))
-                end.append((own == record) * np.exp((history.t0[0] - history.t1) / time))
-        mixing = _mixing(np.log(times), context.rate.size)
-        return np.stack(begin, axis=1) @ mixing, np.stack(end, axis=1) @ mixing
+        mixing, before = _mixing(np.log(times))
+        found = []
+        for columns, at in ((begin, history.t0), (end, history.t1)):
+            left = np.zeros((at.size, context.rate.size, times[::2].size))
+            if record is not None:
+                left[:, record] = np.exp((history.t0[0] - at)[:, None] / times[::2]) @ before
+            found.append(np.hstack([np.stack(columns, axis=1) @ mixing, left.reshape(at.size, -1)]))
+        return found[0], found[1]
 
 
-def _mixing(log_times, records):
-    near = np.exp(-np.abs(log_times[:, None] - log_times) / 1.5)
+def _mixing(log_times):
+    """Roots of the prior covariance of all elements that are driven by the record's own load, and of their states at its
+    beginning: the same earlier load drove elements of all times, so that these are more alike."""
+    apart = np.abs(log_times[:, None] - log_times)
+    near, left = np.exp(-apart / ALIKE), BEFORE**2 * np.exp(-apart[::2, ::2] / ALIKE_BEFORE)
     fewer = np.linalg.cholesky(0.5 * near[::2, ::2])
-    # One load came before all of them.
-    before = np.linalg.cholesky(BEFORE**2 * near[::2, ::2] ** 0.25)
-    return block_diag(np.linalg.cholesky(near), fewer, fewer, *[before] * records)
+    return block_diag(np.linalg.cholesky(near), fewer, fewer), np.linalg.cholesky(left)
 
 
 @numba.njit(cache=True, nogil=True)
