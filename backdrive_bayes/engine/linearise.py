@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from backdrive_bayes.engine.design import LEAST_LAW, Group
-from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
 from backdrive_bayes.engine.reduced import Reduced
@@ -82,17 +81,12 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent
     if bent:
         apart |= {some: apart.get(some) or mode(some) for some in ((), *((name,) for name in bent))}
-        # Of two that act together each alone is likelier than nothing.
-        least = _of_traces(apart[()])
-        likelier = [name for name in bent if apart[(name,)].log_marginal > least]
+        # Of two that act together each alone is likelier than nothing; beside a law of the rate no creep acted.
+        least = apart[()].log_marginal
+        likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
     found = [linear for some, linear in apart.items() if set(some) <= set(bent)]
     return tuple(linear.without(WAVE) for linear in (joint, *found))
-
-
-def _of_traces(linear: Linear) -> float:
-    """Log marginal likelihood where effects are traces only, about the same mode."""
-    return learn_scales(linear, levels(linear, ()))[2].log_marginal + linear.data.log_volume
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:

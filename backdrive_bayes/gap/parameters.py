@@ -39,8 +39,9 @@ def _of_terms(weighed, posterior, effect, level):
         elif isinstance(term, PathEffect):
             design = weighed.of(posterior.hypothesis).design
             group = design.group(term.name)
-            columns = np.vstack([group.of_record(r) for r in range(len(group.columns))])
-            columns = columns - columns.mean(axis=0)
+            # Each record has an offset of its own.
+            records = (group.of_record(r) for r in range(len(group.columns)))
+            columns = np.vstack([c - c.mean(axis=0) for c in records])
             size = np.sqrt(np.mean((weights @ columns.T) ** 2, axis=1)) * context.angle_scale_rad
             rows[f"{term.name}_rms"] = central(size, level) | {"unit": "rad"}
     return rows

@@ -2,7 +2,7 @@
 
 Records are held out in turn, or legs where there is one record. Weights are those of the rest; what belongs to the
 held-out record
-alone (its offset, drift) is fitted to it under its prior, for no other record tells it.
+alone (its offset, drift, a creep in progress) is fitted to it under its prior, for no other record tells it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from backdrive_bayes.engine.design import Design
+from backdrive_bayes.engine.design import histories
 from backdrive_bayes.engine.levels import learn_scales
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import whiten
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
+from backdrive_bayes.mechanics.effect import Distortion, PathEffect
 
 RESAMPLED = 400
 FEWEST_PIECES = 4
@@ -168,7 +169,7 @@ def _held_out(fitted: Fitted, own, record) -> tuple[np.ndarray, np.ndarray]:
     columns, angle = np.vstack(design.records()), np.concatenate(linear.angles)[:, None]
     rest = np.setdiff1d(np.arange(record.size), own)
     gone = np.setdiff1d(record[own], record[rest])
-    alone = _alone(design, int(gone[0])) if gone.size else np.full(columns.shape[1], False)
+    alone = _alone(linear, int(gone[0])) if gone.size else np.full(columns.shape[1], False)
     left, used = angle[own], ~alone
     if rest.size:
         weights, root = _ridge(linear, columns, angle, rest, record, fitted.scale, used)
@@ -180,12 +181,16 @@ def _held_out(fitted: Fitted, own, record) -> tuple[np.ndarray, np.ndarray]:
     return left[:, 0], left[:, 1:]
 
 
-def _alone(design: Design, record: int) -> np.ndarray:
-    """Which weights belong to one record alone, (weights,)."""
-    found = []
-    for group in design.groups:
+def _alone(linear: Linear, record: int) -> np.ndarray:
+    """Which weights belong to one record alone, (weights,): those whose columns a path that was not measured lacks."""
+    history, effects = histories(linear.reduced, Distortion())[record], {e.name: e for e in linear.effects}
+    found: list[np.ndarray] = []
+    for group in linear.design.groups:
         if group.own:
             found += [np.full(c.shape[1], r == record) for r, c in enumerate(group.columns)]
+        elif isinstance(effect := effects.get(group.name), PathEffect):
+            shared = effect.responses(history, None, linear.reduced.context)[1].any(axis=0)
+            found.append(group.columns[record].any(axis=0) & ~shared)
         else:
             found.append(np.full(group.width, False))
     return np.concatenate(found)

@@ -132,8 +132,7 @@ def _zero_weights(record: Record, segment) -> np.ndarray | None:
     length = time[windows[1]][-1] - time[windows[1]][0]
     if not time[windows[1]][0] - length <= at <= time[windows[1]][-1] + length:
         return None
-    # Of a torque that rests at zero half the time tells nothing.
-    closely = closely if abs(closely - at) <= length else at
+    closely = float(np.clip(closely, at - length, at + length))
     short, long = (slice(segment.start + w.start, segment.start + w.stop) for w in windows)
     return np.stack([_line_weights(record, span, t) for span, t in ((short, at), (long, at), (short, closely))])
 

@@ -15,6 +15,7 @@ from backdrive_bayes.engine.linearise import linearise
 from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.reduced import Jitter, reduce_unit
 from backdrive_bayes.engine.sample import ABOVE, compress
+from backdrive_bayes.engine.search import BENDING
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.errors import BadInput
@@ -192,6 +193,13 @@ def test_a_clean_unit_has_one_mode_and_an_offset_adds_those_without_and_with_it_
     trace = [np.log(trace_levels(m.reduced, m.design, m.effects)["torque_offset"]) for m in found]
     assert [m.log_scale["torque_offset"] == pytest.approx(t) for m, t in zip(found, trace, strict=True)] == [False, True, False]
     assert found[2].log_marginal > found[1].log_marginal + 50
+
+
+def test_two_that_act_together_have_a_mode_of_their_own_which_is_the_likeliest():
+    found = linearise(reduce_unit(planted(offset_nm=8e-4, lag_s=0.03, loops=MORE)), library_terms())[1:]
+    traces = [trace_levels(m.reduced, m.design, m.effects) for m in found]
+    acts = [{n for n in BENDING if n in t and m.log_scale[n] > np.log(t[n]) + 0.1} for m, t in zip(found, traces, strict=True)]
+    assert acts[int(np.argmax([m.log_marginal for m in found]))] >= {"torque_offset", "sensor_lag"}
 
 
 def test_friction_that_follows_the_rate_is_found_at_its_own_mode():

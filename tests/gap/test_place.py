@@ -12,7 +12,7 @@ from backdrive_bayes.engine.infer import library_terms, prepare
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.gap import examine, next_test, where
-from backdrive_bayes.gap.shrink import closed_fraction, fit_hypothesis, shrink, within_reach
+from backdrive_bayes.gap.shrink import _alone, closed_fraction, fit_hypothesis, shrink, within_reach
 
 
 @cache
@@ -104,6 +104,16 @@ def test_a_property_is_in_the_class_before_and_after():
     assert of(("second_backlash",), inside) is None
     assert of(("asymmetric_stiffness", "second_backlash"), added)["median"] > 0.75
     assert of((), inside)["hi"] == 0.0
+
+
+def test_what_no_other_record_tells_is_fitted_to_the_record_that_is_held_out():
+    """The drift of a record and the states of creep at its beginning, of two records; nothing of the class."""
+    linear = prepared("none")[0]
+    alone = _alone(linear, 0)
+    names = np.array(linear.design.names)[linear.design.index]
+    assert set(names[alone]) == {"thermal_drift", "viscoelastic_creep"}
+    drift, creep = names == "thermal_drift", names == "viscoelastic_creep"
+    assert 2 * alone[drift].sum() == drift.sum() and alone[creep].sum() == 4
 
 
 def test_held_out_records_are_every_record_in_turn():
