@@ -184,13 +184,13 @@ def _held_out(fitted: Fitted, own, record) -> tuple[np.ndarray, np.ndarray]:
 def _alone(linear: Linear, record: int) -> np.ndarray:
     """Which weights belong to one record alone, (weights,): those whose columns a path that was not measured lacks."""
     history, effects = histories(linear.reduced, Distortion())[record], {e.name: e for e in linear.effects}
-    found: list[np.ndarray] = []
+    found = []
     for group in linear.design.groups:
         if group.own:
             found += [np.full(c.shape[1], r == record) for r, c in enumerate(group.columns)]
         elif isinstance(effect := effects.get(group.name), PathEffect):
-            shared = effect.responses(history, None, linear.reduced.context)[1].any(axis=0)
-            found.append(group.columns[record].any(axis=0) & ~shared)
+            shared = effect.responses(history, None, linear.reduced.context)[1]
+            found.append(np.logical_and(group.columns[record].any(axis=0), ~shared.any(axis=0)))
         else:
             found.append(np.full(group.width, False))
     return np.concatenate(found)
