@@ -51,16 +51,23 @@ if __name__ == "__main__":
     folder, out = map(Path, sys.argv[1:])
     with store.locked(out), cluster.local(2) as client:
         found = units.find_units(folder, out)
-        run.run_fleet(task.Job(out, Read(seconds=0.3)), found, client, lambda text, share: print(text, flush=True))
+        run.run_fleet(task.Job(out, Read(seconds=1.0)), found, client, lambda text, share: print(text, flush=True))
 """
 
 
 @pytest.fixture(scope="module")
-def two_workers():
+def local_cluster():
     """A client of two worker processes on this machine."""
     pytest.importorskip("distributed", reason="the extra fleet is not installed")
     with cluster.local(2) as client:
         yield client
+
+
+@pytest.fixture
+def two_workers(local_cluster):
+    """The same client, with both workers there whatever an earlier test did to them."""
+    local_cluster.wait_for_workers(2, timeout=60)
+    return local_cluster
 
 
 @pytest.fixture
@@ -69,10 +76,10 @@ def fleet(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def undisturbed(two_workers, tmp_path_factory):
+def undisturbed(local_cluster, tmp_path_factory):
     """The files of a run in which nothing happens."""
     room = tmp_path_factory.mktemp("undisturbed")
-    return files(run(two_workers, make_fleet(room / "fleet", UNITS), room / "out")[0])
+    return files(run(local_cluster, make_fleet(room / "fleet", UNITS), room / "out")[0])
 
 
 def run(client, folder, out, work=None, units=None, note=lambda text, share: None, **job):
@@ -95,6 +102,14 @@ def assert_each_once(tally):
 
 def counts(tally):
     return dict(tally.counts)
+
+
+def until(true, seconds=60):
+    """Whether it becomes true in time."""
+    deadline = time.monotonic() + seconds
+    while not true() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return true()
 
 
 def test_one_worker_or_two_in_any_order_give_the_same_bytes(fleet, tmp_path, undisturbed):
@@ -276,18 +291,21 @@ def test_workers_that_die_while_they_start_are_replaced(fleet, tmp_path, two_wor
 def test_workers_that_are_given_up_are_started_anew(two_workers):
     """Dask gives a worker up where it dies at the wrong moment of its start."""
     keepers = two_workers.cluster.workers
-    for keeper in list(keepers.values()):
+    given_up = list(keepers.values())  # one may have been replaced before the other is closed
+    for keeper in given_up:
         two_workers.cluster.sync(keeper.close)
-    assert not any(keeper.status.name == "running" for keeper in keepers.values())
+    assert len(given_up) == 2 and not any(keeper.status.name == "running" for keeper in given_up)
+    assert until(lambda: sum(keeper.status.name == "running" for keeper in list(keepers.values())) == 2)
+    assert not set(given_up) & set(keepers.values())
     two_workers.wait_for_workers(2, timeout=30)
 
 
 def test_results_that_are_lost_with_their_worker_are_asked_for_again(fleet, tmp_path, two_workers, undisturbed):
-    killed = []
+    killed, units = [], find_units(fleet, tmp_path / "out")
 
     def note(text, share):
-        if not killed:
-            time.sleep(1.0)  # the others are done meanwhile; what they came to lies with the workers
+        if not killed:  # the others are done meanwhile; what they came to lies with the workers
+            assert until(lambda: all(result_path(tmp_path / "out", unit).exists() for unit in units))
             killed.extend(two_workers.run(os.getpid).values())
             for pid in killed:
                 os.kill(pid, signal.SIGKILL)
