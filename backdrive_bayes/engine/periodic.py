@@ -18,7 +18,7 @@ MOST_PHASES = 5
 """Records up to which each may have a phase of its own: the search of more would take minutes."""
 SAME_ZERO = 0.1
 """Middles of loops, in angle scales, that lie closer are read from one zero: drift moves them as far."""
-HARMONICS = 3
+HARMONICS = 5
 """An interpolation error has harmonics: distorted quadrature signals give the second, flattened ones the third and fourth
 (Heydemann, Appl. Opt. 20, 1981). The k-th is usually 1/k² of the first."""
 FINE = 9
