@@ -85,7 +85,8 @@ class Cells:
         if power and history.surging:
             found = share @ self._surging(history, power)[0] @ _shares(history)
         else:
-            found = _summed(*_segments(history), *self._relays(history.start, history.state), share)
+            arguments = *_segments(history), *self._relays(history.start, history.state), share
+            found = _summed(*arguments)
         return found - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
 
     def _surging(self, history, power):
