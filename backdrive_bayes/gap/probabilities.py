@@ -27,15 +27,15 @@ class Calibration:
     90 % set must gather.
     """
 
-    cool: float = 1.46
-    warm: float = 1.10
-    single: float = -2.86
-    second: float = -3.60
-    wave: float = -0.98
-    unlisted: float = -1.83
-    beside: float = -2.88
-    spread: float = 0.31
-    cover: float = 0.91
+    cool: float = 1.0
+    warm: float = 1.89
+    single: float = -3.36
+    second: float = -3.58
+    wave: float = -2.0
+    unlisted: float = -2.3
+    beside: float = -2.7
+    spread: float = 0.355
+    cover: float = 0.923
 
 
 CALIBRATION = Calibration()

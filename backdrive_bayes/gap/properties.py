@@ -20,7 +20,7 @@ from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
-from backdrive_bayes.gap.probabilities import CALIBRATION, probabilities
+from backdrive_bayes.gap.probabilities import probabilities
 from backdrive_bayes.mechanics.history import through
 
 DRAWS = 120
@@ -44,6 +44,8 @@ OWN = (0.01, 0.5)
 """Share of reducers whose own clearance is crossed in steps within TORQUES, and the standard deviation of such steps."""
 SOFTENING = (0.05, LARGE)
 """Share of reducers that soften towards full load without a clamp that slips, and by how much."""
+ODDS = -2.86
+"""Log odds that a reducer has one of them."""
 SURE = 0.97
 """No property is more certain than this: thresholds are practical, not physical."""
 
@@ -160,7 +162,7 @@ def properties_of(branches: Branches, angle_scale_rad: float, torque_scale_nm: f
     found = []
     for name, (sizes, torques, variance, own) in (("second_backlash", second), ("interface_slip", slip)):
         log_factor, best = present(sizes, variance, own)
-        probability = float(np.clip(expit(log_factor + CALIBRATION.single), 1.0 - SURE, SURE))
+        probability = float(np.clip(expit(log_factor + ODDS), 1.0 - SURE, SURE))
         found.append(Property(name, probability, sizes[:, best] * angle_scale_rad, float(torques[best]) * torque_scale_nm))
     return tuple(found)
 

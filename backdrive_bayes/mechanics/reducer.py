@@ -16,7 +16,7 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.cells import Cells
 from backdrive_bayes.mechanics.history import History
 
-TOP = 1.5
+TOP = 1.2
 """Torque up to which cells reach, in the unit's largest: an offset of the torque channel must not leave the class."""
 THRESHOLDS = np.r_[np.geomspace(0.003, 0.12, 10), np.arange(0.16, 0.94, 0.05)]
 """Thresholds of friction at first; a bearing that slips at one torque bends the loop at one distance from its tips."""

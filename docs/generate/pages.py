@@ -58,6 +58,7 @@ NUMBERS = {
     "own_size": f"{properties.OWN[1]:g}",
     "softening_share": f"{properties.SOFTENING[0]:g}",
     "softening_size": f"{properties.SOFTENING[1]:g}",
+    "property_odds": f"{properties.ODDS:g}",
     "lowest": f"{properties.TORQUES[0]:g}",
     "highest": f"{properties.TORQUES[-1]:g}",
     "widths": ", ".join(f"{w:g}" for w in properties.WIDTHS),
