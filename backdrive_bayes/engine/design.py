@@ -11,7 +11,6 @@ import numpy as np
 from backdrive_bayes.engine.marginal import Scales
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import (
-    POWER,
     Distortion,
     Effect,
     FlankEffect,
@@ -150,7 +149,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
             groups.append(Group(effect.name, tuple(c / rate for c, rate in zip(late.columns, reduced.context.rate, strict=True))))
         if isinstance(effect, GrowthEffect):
             terms = [reduced.context.law(x)[effect.term] for x in reduced.context.log_rate]
-            if _told(effect, terms, histories(reduced, distortion)):
+            if np.ptp(terms) > LEAST_LAW:
                 grown = grown or _grown(reduced, reducer, distortion, weights)
                 groups.append(Group(effect.name, tuple(g[:, [effect.part]] * t for g, t in zip(grown, terms, strict=True))))
         elif isinstance(effect, TangentEffect):
@@ -158,11 +157,6 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
             there = class_prediction(reduced, reducer, moved, weights)
             groups.append(Group(effect.name, tuple(((a - b) / STEP)[:, None] for a, b in zip(there, base, strict=True))))
     return tuple(groups)
-
-
-def _told(effect, terms, found) -> bool:
-    """Whether records tell a term of the rate's law: their rates differ, or the rate along one of the histories ``found``."""
-    return any(h.surging for h in found) if effect.term == POWER else np.ptp(terms) > LEAST_LAW
 
 
 def _grown(reduced, reducer, distortion, weights):

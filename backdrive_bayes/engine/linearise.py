@@ -6,7 +6,9 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
-from backdrive_bayes.engine.design import Group
+import numpy as np
+
+from backdrive_bayes.engine.design import LEAST_LAW, Group
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
 from backdrive_bayes.engine.reduced import Reduced
@@ -15,7 +17,6 @@ from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect
 from backdrive_bayes.mechanics.reducer import BASELINE
-from backdrive_bayes.mechanics.registry import all_effects
 
 TRIAL_STEPS = 2
 BENT = 2.0
@@ -67,14 +68,14 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
     bent = _bent(joint, reach)
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
-    reach = replace(reach, friction_exponent=0.0, friction_bend=0.0, friction_power=0.0)
+    reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
 
     def mode(some: tuple[str, ...]) -> Linear:
         own = replace(free, reduced=joint.reduced, fixed=(*free.fixed, *(waves if WAVE in some else ())), only=some)
         return own.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter)
 
     apart: dict[tuple[str, ...], Linear] = {}
-    if LAW not in bent and any(term.name in joint.design.names for term in all_effects()[LAW]):
+    if LAW not in bent and np.ptp(context.log_rate) > LEAST_LAW:
         # A creep may stand for all of it.
         apart[(LAW,)] = mode((LAW,))
         bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent

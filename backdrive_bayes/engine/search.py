@@ -36,7 +36,7 @@ LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"
 BENDING = {
     "torque_offset": ("offset",),
     "sensor_lag": ("lag_s",),
-    LAW: ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend", "friction_power", "drag_power"),
+    LAW: ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend"),
 }
 """Effects whose columns are derivatives, and the places of their parameters in a distortion."""
 WIDE = 2.0
@@ -166,7 +166,7 @@ def _shift(design, distortion, effects, context):
 def _step(moved, distortion, context):
     """Step in shares of the torque scale; exponents weigh a fiftieth."""
     step = np.array([getattr(moved, n) - getattr(distortion, n) for n in vars(distortion)])
-    return step * np.r_[1.0, context.rate.max(), np.full(step.size - 2, 0.02)]
+    return step * [1.0, context.rate.max(), 0.02, 0.02, 0.02, 0.02]
 
 
 def length(moved, distortion, context) -> float:

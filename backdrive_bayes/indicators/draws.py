@@ -10,7 +10,6 @@ from backdrive_bayes.engine.parameters import posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators.loop import Loops, cut_loops, loop_grid, settled_history, settled_loops
-from backdrive_bayes.mechanics.reducer import NO_GROWTH
 
 KEPT_A_CHAIN = 100
 """Draws of each chain that are used where many loops are wanted."""
@@ -145,9 +144,9 @@ class IndicatorDraws:
         largest = int(np.argmax(self.amplitudes))
         rate, amplitude = self.rates[largest], self.amplitudes[largest]
         torque = loop_grid(posterior, amplitude, (self.rated_torque_nm,))
-        wider = (float(np.log(factor)) * (parameter == name) for name in ("friction_torque_Nm", "drag_torque_Nm"))
+        wider = [np.log(factor) * (parameter == name) for name in ("friction_torque_Nm", "drag_torque_Nm")]
         history = settled_history(torque, rate, posterior.context.torque_scale_nm)
-        columns = posterior.reducer.ends(history, (*wider, *NO_GROWTH[2:]))
+        columns = posterior.reducer.ends(history, (float(wider[0]), float(wider[1])))
         flat = replace(posterior, weights=weights).flat
         parts = {n: cut_loops(torque, flat[n] @ c.T * posterior.context.angle_scale_rad) for n, c in columns.items()}
         by_module = {m: _sum(parts, posterior.reducer, m) for m in posterior.reducer.modules}

@@ -14,14 +14,11 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from scipy import sparse
 
 from backdrive_bayes.mechanics.history import History
 
 CROSSED = 0.7
 """Torque, in shares of the largest, by which clearances are crossed: relays beyond stand for friction near the loop's tip."""
-MOST_GROWTH = 3.0
-"""Log factor of thresholds beyond which no law of the rate is followed."""
 START = ("neutral", "upper", "lower")
 """Initial states: demagnetised (a clearance in its middle), as after a large positive torque, as after a large negative one."""
 
@@ -66,34 +63,20 @@ class Cells:
         scale = np.where(clearance & (self.up + self.width <= CROSSED), factor, 1.0)
         return Cells(scale * self.up + shift, scale * self.down - shift, scale * self.width, scale * self.norm)
 
-    def means(self, history: History, sign: float = 1.0, power: float = 0.0) -> np.ndarray:
+    def means(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
-        that differ). Thresholds follow this ``power`` of the rate at the moment over the mean rate."""
-        if power and history.surging:
-            return self._paired(self._surging(history, power)[0] @ _shares(history), sign)
+        that differ)."""
         return self._paired(_means(*_segments(history), *self._relays(history.start, history.state)), sign)
 
-    def ends(self, history: History, sign: float = 1.0, power: float = 0.0) -> np.ndarray:
+    def ends(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Responses at the end of every segment, shape (segments, cells)."""
-        if power and history.surging:
-            return self._paired(self._surging(history, power)[1], sign)
         return self._paired(_ends(history.z1, *self._relays(history.start, history.state)), sign)
 
-    def summed(self, history: History, weights, sign: float = 1.0, power: float = 0.0) -> np.ndarray:
+    def summed(self, history: History, weights, sign: float = 1.0) -> np.ndarray:
         """Block means times ``weights`` (cells,), (blocks,)."""
         share = np.concatenate([weights / self.norm, sign * weights / self.norm])
-        if power and history.surging:
-            found = share @ self._surging(history, power)[0] @ _shares(history)
-        else:
-            arguments = *_segments(history), *self._relays(history.start, history.state), share
-            found = _summed(*arguments)
-        return found - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
-
-    def _surging(self, history, power):
-        """States of all relays whose thresholds follow the rate at the moment, (relays, segments): means and at the ends."""
-        scaled = np.tile(self.clearance & (self.up + self.width <= CROSSED), 2)
-        threshold = np.where(np.tile(self.clearance, 2), 0.0, np.tile(self.threshold, 2))
-        return _surged(*_growing(history, power), *self._relays(history.start, history.state), threshold, scaled)
+        arguments = *_segments(history), *self._relays(history.start, history.state), share
+        return _summed(*arguments) - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
 
     @cached_property
     def _both(self):
@@ -117,18 +100,6 @@ class Cells:
         one, other = response[: self.count], response[self.count :]
         width, norm = self.width[:, None], self.norm[:, None]
         return ((one + sign * other - 0.5 * (1.0 + sign) * width) / norm).T
-
-
-def _growing(history, power):
-    """Torques at the segments' ends and the factors of thresholds there."""
-    factors = (np.exp(np.clip(power * surge, -MOST_GROWTH, MOST_GROWTH)) for surge in (history.surge0, history.surge1))
-    return history.z0, history.z1, *factors
-
-
-def _shares(history):
-    """Shares of the segments in the blocks, sparse (segments, blocks)."""
-    rows = np.arange(history.weight.size)
-    return sparse.csr_array((history.weight, (rows, history.block)), shape=(rows.size, history.blocks))
 
 
 def _segments(history):
@@ -232,33 +203,3 @@ def _ends(z1, up, down, width, first):
             x = min(x, min(max(z1[i] - b, 0.0), w))
             out[j, i] = x
     return out
-
-
-@numba.njit(cache=True, nogil=True)
-def _surged(z0, z1, f0, f1, up, down, width, first, threshold, scaled):
-    """Means and ends (cells, segments) of states whose thresholds are multiplied by a factor that runs from f0 to f1 along each
-    segment: the lower torque of a play rises, and its upper one falls, by what its ``threshold`` loses. A clearance that is
-    ``scaled`` feels the torque divided by the factor."""
-    mean, ends = np.empty((up.size, z0.size)), np.empty((up.size, z0.size))
-    for j in range(up.size):
-        x, a, b, w, r = first[j], up[j], down[j], width[j], threshold[j]
-        for i in range(z0.size):
-            if scaled[j]:
-                p0, p1 = z0[i] / f0[i], z1[i] / f1[i]
-                q0, q1 = p0, p1
-            else:
-                less0, less1 = r * (f0[i] - 1.0), r * (f1[i] - 1.0)
-                p0, p1, q0, q1 = z0[i] - less0, z1[i] - less1, z0[i] + less0, z1[i] + less1
-            if i == 0:
-                x = min(max(x, min(p0 - a, w)), max(q0 - b, 0.0))
-            mean[j, i] = x
-            if p1 > p0 and p1 > a + x and x < w:
-                turn = max(p0, a + x)
-                mean[j, i] = (x * (turn - p0) + _integral(p1 - a, w) - _integral(turn - a, w)) / (p1 - p0)
-                x = max(x, min(p1 - a, w))
-            elif q1 < q0 and q1 < b + x and x > 0.0:
-                turn = min(q0, b + x)
-                mean[j, i] = (x * (q0 - turn) + _integral(turn - b, w) - _integral(q1 - b, w)) / (q0 - q1)
-                x = min(x, max(q1 - b, 0.0))
-            ends[j, i] = x
-    return mean, ends

@@ -7,11 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from backdrive_bayes.mechanics.cells import MOST_GROWTH
 from backdrive_bayes.mechanics.history import History
 
-POWER = 2
-"""Place of the power of the rate at the moment among the terms of the rate's law."""
+MOST_GROWTH = 3.0
+"""Log factor of thresholds beyond which no law of the rate is followed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +34,9 @@ class Context:
         """Logarithms of the rates over their geometric mean, (records,)."""
         return np.log(self.rate) - np.log(self.rate).mean()
 
-    def law(self, log_rate: float) -> tuple[float, float, float]:
-        """What an exponent, a bend and a power of a law of the rate are multiplied by; the records' mean bend is none."""
-        return float(log_rate), float(log_rate**2 - np.mean(self.log_rate**2)), 1.0
+    def law(self, log_rate: float) -> tuple[float, float]:
+        """What an exponent and a bend of a law of the rate are multiplied by; the records' mean bend is none."""
+        return float(log_rate), float(log_rate**2 - np.mean(self.log_rate**2))
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ class TangentEffect(Effect):
 class GrowthEffect(TangentEffect):
     """An effect by which the thresholds of one part follow the rate: the derivative by their growth times a term of the law.
 
-    ``part`` is the place among the growths of :meth:`Distortion.growth`, ``term`` that of exponent (0), bend (1) or power (2).
+    ``part`` is the number of friction (0) or drag (1), ``term`` that of exponent (0) or bend (1).
     """
 
     part: int = 0
@@ -111,7 +110,7 @@ class Distortion:
     """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
 
     ``offset`` is a share of the torque scale, ``lag_s`` in seconds; the logarithms of friction and drag thresholds follow the log
-    of the rate with these exponents and bends, and that of the rate at the moment over a record's mean rate with these powers.
+    of the rate with these exponents and bends.
     """
 
     offset: float = 0.0
@@ -120,13 +119,11 @@ class Distortion:
     drag_exponent: float = 0.0
     friction_bend: float = 0.0
     drag_bend: float = 0.0
-    friction_power: float = 0.0
-    drag_power: float = 0.0
 
-    def growth(self, log_rate: float, context: Context) -> tuple[float, float, float, float]:
-        """Logarithms of the factors of friction and drag thresholds at a rate, and their powers of the rate at the moment."""
-        line, bend, _ = context.law(log_rate)
+    def growth(self, log_rate: float, context: Context) -> tuple[float, float]:
+        """Logarithms of the factors of friction and drag thresholds at a rate."""
+        line, bend = context.law(log_rate)
         growth = np.array([self.friction_exponent, self.drag_exponent]) * line
         growth += np.array([self.friction_bend, self.drag_bend]) * bend
         friction, drag = np.clip(growth, -MOST_GROWTH, MOST_GROWTH)
-        return float(friction), float(drag), self.friction_power, self.drag_power
+        return float(friction), float(drag)

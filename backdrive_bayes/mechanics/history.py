@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numba
 import numpy as np
@@ -12,12 +11,6 @@ from backdrive_bayes.records.reduction import FEW, Blocks
 
 PIECES = 3
 """Straight pieces a block: the torque within a block is nearly straight, turning points are nodes of their own."""
-FILM = 0.03
-"""Torque, in shares of the largest, that passes at the usual rate while a film of lubricant takes on a new speed."""
-LEAST_SURGE = 0.05
-"""Range of the log rate along a history below which it is one rate."""
-RESTING = 0.05
-"""Rate, in shares of the usual one, below which a film stays as it is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +19,7 @@ class History:
 
     ``z0`` and ``z1`` are the torques at the ends as shares of the unit's largest torque, ``t0`` and ``t1`` the times
     [s], ``block``
-    the block that a segment belongs to and ``weight`` its share of the block's time. ``surge0`` and ``surge1`` are the logarithms
-    of the loading rate at the ends over the history's mean rate. ``state`` is the one of
+    the block that a segment belongs to and ``weight`` its share of the block's time. ``state`` is the one of
     :data:`backdrive_bayes.mechanics.cells.START` in which it begins.
     """
 
@@ -38,14 +30,7 @@ class History:
     block: np.ndarray
     weight: np.ndarray
     blocks: int
-    surge0: np.ndarray
-    surge1: np.ndarray
     state: str = "neutral"
-
-    @cached_property
-    def surging(self) -> bool:
-        """Whether the rate differs along the history."""
-        return bool(max(np.ptp(self.surge0), np.ptp(self.surge1)) > LEAST_SURGE)
 
     @property
     def start(self) -> float:
@@ -80,10 +65,9 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     owner, weight = np.r_[owner, who], np.r_[weight, 1.0 / blocks.count[who]]
     order = np.lexsort((t0, t1))
     z0, z1 = (np.interp(t[order], blocks.path_s, blocks.path_nm) / torque_scale_nm + offset for t in (t0, t1))
-    early, late = (_surge(blocks.path_s, blocks.path_nm / torque_scale_nm, t[order]) for t in (t0, t1))
     # A tip is reached from the other side.
     state = "neutral" if not blocks.begins_at_tip else "lower" if blocks.turning_nm[0] > 0 else "upper"
-    return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size, early, late, state)
+    return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size, state)
 
 
 def _samples(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
@@ -99,21 +83,7 @@ def through(time_s, torque_nm, torque_scale_nm: float) -> History:
     """History straight between given samples; segment i ends at sample i + 1 and is a block of its own."""
     z, count = np.asarray(torque_nm, float) / torque_scale_nm, len(torque_nm) - 1
     time = np.asarray(time_s, float)
-    surge = _surge(time, z, time)
-    return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count, surge[:-1], surge[1:])
-
-
-def _surge(time_s, z, at_s) -> np.ndarray:
-    """Logarithm of the loading rate about instants [s] over the mean rate of a path straight between ``time_s``."""
-    passed = np.r_[0.0, np.cumsum(np.abs(np.diff(z)))]
-    span = time_s[-1] - time_s[0]
-    if not (span > 0.0 and passed[-1] > 0.0):
-        return np.zeros(np.size(at_s))
-    usual = passed[-1] / span
-    at_s = np.clip(at_s, time_s[0], time_s[-1])
-    begin, end = (np.clip(at_s + sign * FILM / usual, time_s[0], time_s[-1]) for sign in (-1.0, 1.0))
-    rate = (np.interp(end, time_s, passed) - np.interp(begin, time_s, passed)) / (end - begin)
-    return np.log(np.maximum(rate / usual, RESTING))
+    return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -26,9 +26,6 @@ variance."""
 READ_OUTS = (0.0, 0.04, 0.12, 0.28, 0.5, 0.75, 0.9, 1.0)
 """Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
-GROWING = ("friction", "clearance") * 2
-"""Parts whose thresholds grow, by the record and with a power of the rate at the moment."""
-NO_GROWTH = (0.0,) * len(GROWING)
 GROWTH_STEP = 2e-3
 """Step of the difference quotients by the growth of thresholds."""
 LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
@@ -88,53 +85,48 @@ class ReducerClass:
         """A part by name; its module must not be left out."""
         return next(p for p in self.parts if p.name == name)
 
-    def columns(self, history: History, growth=NO_GROWTH) -> dict[str, np.ndarray]:
+    def columns(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """Block means of every part's columns, (blocks, weights) by name.
 
-        Thresholds of friction and drag are multiplied by exp(growth[:2]) and follow the powers growth[2:] of the rate at the
-        moment.
+        Friction and drag thresholds are multiplied by exp(growth).
         """
-        return {p.name: p.mix(_cells(p, growth).means(history, power=_power(p, growth))) for p in self.parts}
+        return {p.name: p.mix(self._cells(p, growth).means(history)) for p in self.parts}
 
-    def grown(self, history: History, weights, growth=NO_GROWTH, ends: bool = False) -> np.ndarray:
-        """Derivatives of the block means with independent ``weights`` by ``growth``, (blocks, 4), or at the segments' ends;
-        nothing by a power where a history has one rate."""
-        columns = np.zeros((history.z1.size if ends else history.blocks, len(growth)))
-        for k, name in enumerate(GROWING):
-            if k >= len(GROWING) // 2 and not history.surging:
+    def grown(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False) -> np.ndarray:
+        """Derivatives of the block means with independent ``weights`` by the growth of friction and of drag, (blocks, 2),
+        or at the segments' ends."""
+        columns = []
+        for k, name in enumerate(("friction", "clearance")):
+            part = self.part(name)
+            if part is None:
+                columns.append(np.zeros(history.z1.size if ends else history.blocks))
                 continue
-            part, more = self.part(name), tuple(g + GROWTH_STEP * (i == k) for i, g in enumerate(growth))
-            there, here = (_response(part, g, history, weights[name], ends) for g in (more, growth))
-            columns[:, k] = (there - here) / GROWTH_STEP
-        return columns
+            more = tuple(g + GROWTH_STEP * (i == k) for i, g in enumerate(growth))
+            there, here = (_response(self._cells(part, g), history, part.weights(weights[name]), ends) for g in (more, growth))
+            columns.append((there - here) / GROWTH_STEP)
+        return np.stack(columns, axis=1)
 
-    def ends(self, history: History, growth=NO_GROWTH) -> dict[str, np.ndarray]:
+    def ends(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """The same at the end of every segment."""
-        return {p.name: p.mix(_cells(p, growth).ends(history, power=_power(p, growth))) for p in self.parts}
+        return {p.name: p.mix(self._cells(p, growth).ends(history)) for p in self.parts}
 
-    def flank_columns(self, history: History, weights, growth=NO_GROWTH, ends: bool = False):
+    def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
-        columns = (_response(p, growth, history, weights[p.name], ends, sign=-1.0) for p in self.parts)
+        columns = (_response(self._cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
         return np.stack(list(columns), axis=1)
 
-    def predict(self, history: History, weights, growth=NO_GROWTH) -> np.ndarray:
+    def predict(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
         """Block means (blocks,) at independent ``weights`` by part: columns times weights without making the columns."""
-        return sum(_response(p, growth, history, weights[p.name], False) for p in self.parts)
+        return sum(self._cells(p, growth).summed(history, p.weights(weights[p.name])) for p in self.parts)
+
+    def _cells(self, part, growth):
+        own = {"friction": growth[0], "clearance": growth[1]}.get(part.name, 0.0)
+        return part.cells.wider(float(np.exp(own))) if own else part.cells
 
 
-def _cells(part, growth) -> Cells:
-    own = growth[GROWING.index(part.name)] if part.name in GROWING else 0.0
-    return part.cells.wider(float(np.exp(own))) if own else part.cells
-
-
-def _power(part, growth) -> float:
-    return growth[len(GROWING) // 2 + GROWING.index(part.name)] if part.name in GROWING else 0.0
-
-
-def _response(part, growth, history, weights, ends, sign=1.0):
-    """Sum of a part's responses times independent ``weights``, block means or at the segments' ends."""
-    cells, power, weights = _cells(part, growth), _power(part, growth), part.weights(weights)
-    return cells.ends(history, sign, power) @ weights if ends else cells.summed(history, weights, sign, power)
+def _response(cells, history, weights, ends, sign=1.0):
+    """Sum of the cells' responses times ``weights`` (cells,), block means or at the segments' ends."""
+    return cells.ends(history, sign=sign) @ weights if ends else cells.summed(history, weights, sign=sign)
 
 
 def _compliance() -> Part:

@@ -8,14 +8,7 @@ from importlib.metadata import entry_points
 from backdrive_bayes.mechanics.effect import Effect
 from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.effects.rate_dependent_friction import (
-    DRAG_BEND,
-    DRAG_POWER,
-    DRAG_RATE,
-    FRICTION_BEND,
-    FRICTION_POWER,
-    FRICTION_RATE,
-)
+from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_BEND, DRAG_RATE, FRICTION_BEND, FRICTION_RATE
 from backdrive_bayes.mechanics.effects.sensor_lag import LAG_SPREAD, SENSOR_LAG
 from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
 from backdrive_bayes.mechanics.effects.torque_offset import TORQUE_OFFSET
@@ -25,7 +18,7 @@ from backdrive_bayes.mechanics.effects.viscoelastic_creep import VISCOELASTIC_CR
 LIBRARY: dict[str, tuple[Effect, ...]] = {
     "torque_offset": (TORQUE_OFFSET,),
     "sensor_lag": (SENSOR_LAG, LAG_SPREAD),
-    "rate_dependent_friction": (FRICTION_RATE, DRAG_RATE, FRICTION_BEND, DRAG_BEND, FRICTION_POWER, DRAG_POWER),
+    "rate_dependent_friction": (FRICTION_RATE, DRAG_RATE, FRICTION_BEND, DRAG_BEND),
     "thermal_drift": (THERMAL_DRIFT,),
     "asymmetric_stiffness": (ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS),
     "viscoelastic_creep": (VISCOELASTIC_CREEP,),

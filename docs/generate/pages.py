@@ -32,15 +32,13 @@ from backdrive_bayes.engine import (
 from backdrive_bayes.gap import examine, probabilities, properties, shrink
 from backdrive_bayes.indicators import same_loop
 from backdrive_bayes.indicators.draws import UNITS
-from backdrive_bayes.mechanics import history, reducer
+from backdrive_bayes.mechanics import reducer
 from backdrive_bayes.mechanics.effects import viscoelastic_creep
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records import lines
 
 NUMBERS = {
     "bent": f"{linearise.BENT:g}",
-    "film": f"{history.FILM:g}",
-    "resting": f"{history.RESTING:g}",
     "harmonics": str(periodic.HARMONICS),
     "shared": f"{reducer.SHARED:g}",
     "alike": f"{reducer.ALIKE:g}",

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.planted import HERTZ, LOOPS, MORE, NOISE, SCALE, UNITS, joint_mode, planted, smooth_reducer
+from support.planted import MORE, SCALE, UNITS, joint_mode, planted, smooth_reducer
 
-from backdrive_bayes.bench.known_truth import angle_noise, ramp
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine import search
 from backdrive_bayes.engine.design import class_groups, class_priors
@@ -20,12 +19,9 @@ from backdrive_bayes.engine.search import BENDING
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.gap.averaged import weighed_unit
 from backdrive_bayes.mechanics.effect import Distortion
-from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import HALVINGS, ReducerClass
 from backdrive_bayes.mechanics.registry import LIBRARY
-from backdrive_bayes.records.record import Record, Unit
 
 
 def mode(**options):
@@ -217,36 +213,6 @@ def test_a_law_of_the_rate_that_a_creep_may_stand_for_has_its_own_mode():
     found = linearise(reduce_unit(planted(known=_rough_reducer(6.0), exponent=0.4)), library_terms())
     joint, *apart = (m.distortion.friction_exponent for m in found)
     assert joint < 0.1 and max(apart) == pytest.approx(0.4, abs=0.1)
-
-
-def test_friction_that_follows_the_rate_at_the_moment_is_no_creep():
-    """Loops by hand, fast and slow by turns: of the record's mean rate alone they tell nothing."""
-    unit = _by_hand(_rough_reducer(6.0), 0.4)
-    weighed = weighed_unit(unit)
-    law = weighed.of(("rate_dependent_friction",)).distortion
-    assert law.friction_power == pytest.approx(0.4, abs=0.08) and abs(law.friction_exponent) < 0.15
-    best = max(weighed.log_factor, key=weighed.log_factor.get)
-    assert "rate_dependent_friction" in best
-    assert weighed.log_factor[("rate_dependent_friction",)] > weighed.log_factor[("viscoelastic_creep",)] + 50
-
-
-def _by_hand(known, power):
-    """A unit whose torque goes fast and slow by turns, friction following that rate over its mean with a power."""
-    rng, records, noise = np.random.default_rng(4), [], NOISE
-    for amplitude, rate in LOOPS:
-        even, torque = ramp(amplitude, rate, HERTZ)
-        time = np.cumsum(np.exp(1.2 * np.sin(7.3 * np.pi * even / even[-1]))) / HERTZ
-        time = time * even[-1] / time[-1]
-        torque = np.interp(even, time, torque)
-        history = through(np.r_[even[:1], even], np.r_[torque[:1], torque], SCALE)
-        growth = (0.0, 0.0, power, 0.0)
-        independent = {p.name: np.linalg.solve(m, known.weights[p.name]) if (m := p.mixing) is not None else known.weights[p.name]
-                       for p in known.reducer.parts}  # fmt: skip
-        angle = sum(c @ independent[n] for n, c in known.reducer.ends(history, growth).items()) * known.angle_scale_rad
-        angle = angle + angle_noise(even.size, 1 / HERTZ, noise, rng)
-        torque = torque + noise.torque_nm * rng.standard_normal(even.size)
-        records.append(Record(f"hand-{rate:g}.csv", even, torque, angle, rate, amplitude))
-    return Unit("by hand", SCALE, tuple(records))
 
 
 def _rough_reducer(times):

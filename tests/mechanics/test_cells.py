@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from backdrive_bayes.mechanics.cells import START, Cells, join
-from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.history import History, through
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
 TORQUES = st.lists(st.floats(-1.1, 1.1).map(lambda x: round(x, 3)), min_size=3, max_size=9)
@@ -19,7 +19,6 @@ CELLS = {
 }
 MANY = join(*CELLS.values())
 RELAYS = 400
-WEIGHTS = np.array([0.7, -0.4, 1.3])
 
 
 def path(turning, points=40):
@@ -93,7 +92,7 @@ def test_the_mean_of_the_ends_is_no_block_mean():
 def test_blocks_gather_their_segments_by_weight():
     z = np.array([0.0, 0.3, 0.5, 0.1])
     one = through(np.arange(4.0), z, 1.0)
-    both = replace(one, block=np.array([0, 0, 1]), weight=np.array([0.25, 0.75, 1.0]), blocks=2)
+    both = History(one.z0, one.z1, one.t0, one.t1, np.array([0, 0, 1]), np.array([0.25, 0.75, 1.0]), 2)
     single = MANY.means(one)
     np.testing.assert_allclose(MANY.means(both), np.stack([0.25 * single[0] + 0.75 * single[1], single[2]]), atol=1e-15)
 
@@ -200,45 +199,3 @@ def test_states_bound_the_neutral_one(name):
     assert np.all(lower <= neutral + 1e-15) and np.all(neutral <= upper + 1e-15)
     if name == "friction":
         assert np.any(lower < upper - 1e-3), "a free initial state must make a difference"
-
-
-def test_a_power_of_one_rate_widens_all_thresholds_alike():
-    history = along(path(np.array([0.0, 1.0, -0.8, 0.9, -1.0])))
-    one = replace(history, surge0=np.r_[0.0, np.ones(history.surge0.size - 1)], surge1=np.ones(history.surge1.size))
-    for found, expected in ((MANY.ends(one, power=0.3), MANY.wider(np.exp(0.3)).ends(history)),
-                            (MANY.means(one, power=0.3), MANY.wider(np.exp(0.3)).means(history))):  # fmt: skip
-        np.testing.assert_allclose(found, expected, atol=1e-9)
-    assert np.abs(MANY.ends(one, power=0.3) - MANY.ends(history)).max() > 0.1
-    np.testing.assert_allclose(MANY.summed(one, WEIGHTS, power=0.3), MANY.means(one, power=0.3) @ WEIGHTS, atol=1e-12)
-
-
-@pytest.mark.parametrize("power", [-0.4, 0.6])
-def test_thresholds_that_follow_the_rate_at_the_moment_are_those_of_single_relays(power):
-    """Relays whose switching torques move while the torque does, on a path that is fast and slow by turns."""
-    torque = path(np.array([0.0, 1.0, -1.0, 0.7, -0.6, 1.0]), 400)
-    history = along(torque, np.cumsum(1.0 + 0.8 * np.sin(np.arange(torque.size) / 60.0)))
-    assert history.surging and np.ptp(history.surge1) > 0.5
-    factor = np.exp(power * history.surge1)
-    columns = []
-    for j in range(MANY.count):
-        up, down, width, clearance = MANY.up[j], MANY.down[j], MANY.width[j], MANY.clearance[j]
-        pair = sum(_moved(history.z1, factor, *edges, width, clearance) for edges in ((up, down), (-down - width, -up - width)))
-        columns.append((pair - width) / MANY.norm[j])
-    found = MANY.ends(history, power=power)
-    np.testing.assert_allclose(found, np.stack(columns, axis=1), atol=4 * 0.4 / RELAYS)
-    assert np.abs(found - MANY.ends(history))[:, 1:].max(axis=0).min() > 0.01
-    # Between its ends a state is followed exactly: here ends are close.
-    before = np.vstack([found[:1], found[:-1]])
-    np.testing.assert_allclose(MANY.means(history, power=power), 0.5 * (before + found), atol=6e-3)
-
-
-def _moved(torque, factor, up, down, width, clearance):
-    """Bundle of relays, followed one by one, whose half distance (whose torques, for a clearance) is multiplied by ``factor``."""
-    share = (np.arange(RELAYS) + 0.5) / RELAYS * width
-    on, found = (share < 0.5 * width) if clearance else (share + 0.5 * (up + down) < 0.0), []
-    for value, f in zip(torque, factor, strict=True):
-        apart = 0.5 * (up - down) * (f - 1.0)
-        high, low = ((up + share) * f, (down + share) * f) if clearance else (up + share + apart, down + share - apart)
-        on = (on | (value > high)) & (value > low)
-        found.append(on.mean() * width)
-    return np.array(found)

@@ -9,7 +9,6 @@ from support.bench import path_of
 from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
 from backdrive_bayes.mechanics import registry
 from backdrive_bayes.mechanics.effect import (
-    POWER,
     Context,
     Distortion,
     Effect,
@@ -32,7 +31,6 @@ TANGENTS = [n for n, t in TERMS.items() if isinstance(t, TangentEffect)]
 RATES = (0.2, 1.0, 2.0)
 CONTEXT = Context(0.1, 0.02, np.array(RATES), 5.0 / np.array(RATES), 2e-3, 1e-3)
 TURNING = np.array([0.0, 1.0, -1.0, 1.0])
-POWERS = [n for n, t in TERMS.items() if isinstance(t, GrowthEffect) and t.term == POWER]
 LATE = {"lag_spread": Distortion(lag_s=0.02)}
 """A lag smooths only where there is one."""
 REDUCER = ReducerClass(np.r_[0.0, np.geomspace(0.01, TOP, 20)])
@@ -43,12 +41,10 @@ def cycle(sign=1.0, seconds=25.0, points=60):
     return through(np.linspace(0.0, seconds, torque.size), sign * torque, 1.0)
 
 
-def record(rate, sign=1.0, per_leg=30, surge=0.0):
-    """Blocks of 0 → +T → −T → +T at ``rate`` torque scales a second, whose logarithm goes up and down by ``surge``."""
+def record(rate, sign=1.0, per_leg=30):
+    """Blocks of 0 → +T → −T → +T at ``rate`` torque scales a second."""
     edges = [sign * np.linspace(a, b, per_leg + 1) for a, b in zip(TURNING[:-1], TURNING[1:], strict=True)]
-    steps = np.concatenate([np.abs(np.diff(e)) for e in edges])
-    slower = np.exp(surge * np.sin(np.arange(steps.size) / 4.0))
-    time = np.r_[0.0, np.cumsum(steps * slower * steps.sum() / (steps @ slower))] / rate
+    time = np.r_[0.0, np.cumsum(np.concatenate([np.abs(np.diff(e)) for e in edges]))] / rate
     torque = np.concatenate([0.5 * (e[1:] + e[:-1]) for e in edges])
     small, direction = np.zeros(torque.size), (sign * np.array([1, -1, 1])).astype(int)
     leg = np.repeat([0, 1, 2], per_leg)
@@ -58,9 +54,9 @@ def record(rate, sign=1.0, per_leg=30, surge=0.0):
     return Blocks("r", 0.1 * torque, small, small, time[:-1], time[1:], count, leg, turning, direction, small, **path)
 
 
-def unit(sign=1.0, rates=RATES, surge=0.0):
+def unit(sign=1.0, rates=RATES):
     """What designs need of a reduced unit."""
-    blocks, rates = tuple(record(r, sign, surge=surge) for r in rates), np.array(rates)
+    blocks, rates = tuple(record(r, sign) for r in rates), np.array(rates)
     return SimpleNamespace(blocks=blocks, torque_scale_nm=0.1, context=Context(0.1, 0.02, rates, 5.0 / rates, 2e-3, 1e-3))
 
 
@@ -84,11 +80,6 @@ def column(name, reduced, distortion=None):
     return tangent_groups(reduced, REDUCER, core, distortion, weights(), (TERMS[name],))[0].columns
 
 
-def telling(name, **options):
-    """A unit that tells a term: powers of the rate at the moment need one that changes along the records."""
-    return unit(surge=1.0 if name in POWERS else 0.0, **options)
-
-
 @pytest.mark.parametrize("name", TERMS)
 def test_an_effect_says_what_it_is_and_how_large(name):
     term = TERMS[name]
@@ -98,7 +89,7 @@ def test_an_effect_says_what_it_is_and_how_large(name):
 
 @pytest.mark.parametrize("name", TERMS)
 def test_columns_have_their_shapes_and_vanish_with_their_weights(name):
-    for blocks, columns in zip(unit().blocks, column(name, telling(name)), strict=True):
+    for blocks, columns in zip(unit().blocks, column(name, unit()), strict=True):
         assert columns.shape[0] == blocks.count.size and columns.shape[1] >= 1 and np.isfinite(columns).all()
         assert np.abs(columns).max() > 0 and not np.any(columns @ np.zeros(columns.shape[1]))
 
@@ -122,17 +113,10 @@ def test_what_breaks_oddness_is_even_under_mirrored_torque(name):
 
 @pytest.mark.parametrize("name", [n for n in TERMS if TERMS[n].breaks == "rate independence"])
 def test_what_breaks_rate_independence_is_odd_and_depends_on_the_rate(name):
-    here, there = column(name, telling(name)), column(name, telling(name, sign=-1.0))
+    here, there = column(name, unit()), column(name, unit(-1.0))
     np.testing.assert_allclose(there[0], -here[0], atol=2e-5 * np.abs(here[0]).max())
-    other = unit(surge=0.3) if name in POWERS else unit(rates=(0.2, 0.3, 0.4))
-    fast, slow = column(name, telling(name)), column(name, other)
+    fast, slow = column(name, unit(rates=(0.2, 1.0, 2.0))), column(name, unit(rates=(0.2, 0.3, 0.4)))
     assert max(np.abs(a - b).max() for a, b in zip(fast, slow, strict=True)) > 0.05 * max(np.abs(c).max() for c in here)
-
-
-def test_a_power_of_the_rate_at_the_moment_needs_one_that_changes():
-    core = class_groups(unit(), REDUCER, Distortion())
-    for name in POWERS:
-        assert tangent_groups(unit(), REDUCER, core, Distortion(), weights(), (TERMS[name],)) == ()
 
 
 def test_a_wrong_claim_would_be_seen():
@@ -221,7 +205,7 @@ def test_friction_of_the_bench_has_one_sign():
 def test_tangents_are_derivatives_of_the_prediction():
     """Against a difference quotient ten times as wide."""
     for name in TANGENTS:
-        term, reduced, by = TERMS[name], telling(name), weights()
+        term, reduced, by = TERMS[name], unit(), weights()
         step = 0.02 if isinstance(term, GrowthEffect) else 2e-4
         curves = [class_groups(reduced, REDUCER, Distortion(**{term.parameter: s * step})).predict(by, list(by)) for s in (1, -1)]
         for r, columns in enumerate(column(name, reduced)):

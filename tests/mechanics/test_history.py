@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.bench import path_of
 
-from backdrive_bayes.mechanics.history import PIECES, RESTING, of_blocks, through
+from backdrive_bayes.mechanics.history import PIECES, of_blocks, through
 from backdrive_bayes.records.reduction import Blocks
 
 SCALE, RATE = 0.1, 0.05
@@ -77,24 +77,3 @@ def test_samples_are_blocks_of_their_own():
     history = through([0.0, 1.0, 3.0], [0.0, 0.1, -0.1], SCALE)
     np.testing.assert_allclose(middle(history), [0.5, 0.0], atol=1e-15)
     assert history.start == 0.0 and history.blocks == 2
-
-
-def test_a_constant_rate_does_not_surge_and_tips_are_no_rests():
-    for lag in (0.0, 0.031):
-        history = of_blocks(ramped(), SCALE, 0.01, lag)
-        assert not history.surging
-        np.testing.assert_allclose(np.r_[history.surge0, history.surge1], 0.0, atol=1e-9)
-
-
-def test_a_surge_is_the_log_of_the_rate_over_the_mean_rate():
-    """Slow for the first half of a ramp, three times as fast for the second, then at rest."""
-    corners, torque = np.array([0.0, 3.0, 4.0, 6.0]), SCALE * np.array([0.0, 0.5, 1.0, 1.0])
-    time = np.linspace(0.0, 6.0, 601)
-    history = through(time, np.interp(time, corners, torque), SCALE)
-    at = lambda t: float(np.interp(t, history.t1, history.surge1))  # noqa: E731
-    mean = 1.0 / 6.0
-    assert history.surging
-    assert at(1.5) == pytest.approx(np.log(0.5 / 3.0 / mean), abs=1e-6)
-    assert at(3.5) == pytest.approx(np.log(0.5 / mean), abs=1e-6)
-    assert at(5.5) == pytest.approx(np.log(RESTING))
-    assert at(1.5) < at(3.0) < at(3.5), "a film takes on a new speed by and by"

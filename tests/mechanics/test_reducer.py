@@ -75,32 +75,28 @@ def test_unknown_modules_and_none_that_is_elastic_are_refused(modules):
 
 def test_thresholds_grow_each_by_its_own_logarithm():
     history = ramp(0.0, 1.0, -1.0, 1.0)
-    base, same = REDUCER.columns(history), REDUCER.columns(history, (0.0, 0.0, 0.0, 0.0))
+    base, same = REDUCER.columns(history), REDUCER.columns(history, (0.0, 0.0))
     assert all(np.array_equal(base[n], same[n]) for n in base)
-    wider = REDUCER.columns(history, (0.2, 0.0, 0.0, 0.0))
+    wider = REDUCER.columns(history, (0.2, 0.0))
     assert not np.allclose(wider["friction"], base["friction"])
     assert all(np.array_equal(wider[n], base[n]) for n in ("elastic", "clearance", "free_play"))
-    drag = REDUCER.columns(history, (0.0, 0.2, 0.0, 0.0))
+    drag = REDUCER.columns(history, (0.0, 0.2))
     assert not np.allclose(drag["clearance"], base["clearance"]) and np.array_equal(drag["friction"], base["friction"])
 
 
 @pytest.mark.parametrize("ends", [False, True])
 def test_growth_has_its_own_derivatives(ends):
     """Against difference quotients thirty times as wide, at a growth that is not zero."""
-    growth, step = np.array([0.1, -0.1, 0.2, -0.3]), 0.03
-    torque = np.interp(np.linspace(0.0, 5.0, 601), [0.0, 1.0, 3.0, 5.0], [0.0, 1.0, -1.0, 1.0])
-    even = through(np.arange(601.0), torque, 1.0)
-    history = through(np.cumsum(1.5 + np.sin(np.arange(601) / 20.0)), torque, 1.0)
+    history, growth, step = ramp(0.0, 1.0, -1.0, 1.0), (0.1, -0.1), 0.03
     weights = {p.name: np.ones(p.cells.count if p.mixing is None else p.mixing.shape[1]) for p in REDUCER.parts}
 
     def angle(more):
         columns = (REDUCER.ends if ends else REDUCER.columns)(history, more)
         return sum(columns[n] @ weights[n] for n in columns)
 
-    found = REDUCER.grown(history, weights, tuple(growth), ends)
-    assert history.surging and not np.any(REDUCER.grown(even, weights, tuple(growth), ends)[:, 2:])
-    for k, more in enumerate(step * np.eye(4)):
-        wide = (angle(tuple(growth + more)) - angle(tuple(growth - more))) / (2 * step)
+    found = REDUCER.grown(history, weights, growth, ends)
+    for k, (more, less) in enumerate((((0.13, -0.1), (0.07, -0.1)), ((0.1, -0.07), (0.1, -0.13)))):
+        wide = (angle(more) - angle(less)) / (2 * step)
         assert np.sqrt(np.mean((found[:, k] - wide) ** 2)) < 0.15 * np.abs(wide).max() and np.abs(wide).max() > 0
 
 

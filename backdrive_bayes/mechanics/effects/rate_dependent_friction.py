@@ -1,6 +1,6 @@
 """Friction and drag that depend on the loading rate, rising or falling, with a bend where the law has a minimum or saturates."""
 
-from backdrive_bayes.mechanics.effect import POWER, GrowthEffect
+from backdrive_bayes.mechanics.effect import GrowthEffect
 
 SOURCE = "Stribeck's law over a narrow range of rates; Armstrong-Hélouvry et al., Automatica 30, 1994"
 
@@ -21,14 +21,6 @@ class RateBend(GrowthEffect):
         return 0.015
 
 
-class RatePower(GrowthEffect):
-    """Thresholds follow a power of the rate at the moment where it changes along a record, as a torque by hand or a sine does."""
-
-    def present(self, context):
-        """As the exponent's."""
-        return 0.05
-
-
 def _term(kind, name, signature, part, term):
     return kind(name, "rate independence", signature, SOURCE, parameter=name.replace("rate", "exponent"), part=part, term=term)
 
@@ -37,5 +29,3 @@ FRICTION_RATE = _term(RateExponent, "friction_rate", "width changes with the log
 DRAG_RATE = _term(RateExponent, "drag_rate", "the drag of the clearance changes with the log of the rate", 1, 0)
 FRICTION_BEND = _term(RateBend, "friction_bend", "the width's law of the rate bends", 0, 1)
 DRAG_BEND = _term(RateBend, "drag_bend", "the drag's law of the rate bends", 1, 1)
-FRICTION_POWER = _term(RatePower, "friction_power", "width changes along a record with the rate at the moment", 2, POWER)
-DRAG_POWER = _term(RatePower, "drag_power", "the drag changes along a record with the rate at the moment", 3, POWER)
