@@ -85,6 +85,21 @@ def hertz(x, g, k, p):
 def cl(v, m):
     return m if v > m else (-m if v < -m else v)
 
+
+@njit
+def rubbing(s, J, k, f, dx, fr):
+    # s and the torques of joints J, stiff as k, that slip at f
+    for j in range(J.size):
+        s += cl(J[j] + k[j] * dx, fr * f[j])
+    return s
+
+
+@njit
+def slide(J, k, f, dx, fr):
+    # the joints after a step
+    for j in range(J.size):
+        J[j] = cl(J[j] + k[j] * dx, fr * f[j])
+
 # ----------------------------------------------------------------------------------------------- 1 planet set
 # Parallel planets, each with its own clearance and crowned-tooth (point) contact; the pin of each planet rubs with
 # a constant and a load-carried part; a shaft in series.
@@ -149,9 +164,7 @@ def f_cycloid(x, a):
             N = k * d ** p
             s += N * sn[i]
         s += cn[i] * cl(J[i] + kt * cn[i] * (x - xp), fr * mu * N)
-    for j in range(Q.size):
-        s += cl(Q[j] + kq[j] * (x - xp), fr * fq[j])
-    return s
+    return rubbing(s, Q, kq, fq, x - xp, fr)
 
 
 @njit
@@ -168,8 +181,7 @@ def run_cycloid(tau, fr, gs, gap, sn, cn, k, p, kt, mu, kq, fq, kc, cs):
             d = x * sn[j] - gap[j] * gs[i]
             N = k * d ** p if d > 0 else 0.0
             J[j] = cl(J[j] + kt * cn[j] * (x - xp), fr[i] * mu * N)
-        for j in range(Q.size):
-            Q[j] = cl(Q[j] + kq[j] * (x - xp), fr[i] * fq[j])
+        slide(Q, kq, fq, x - xp, fr[i])
         st = max(1e-6, 0.7 * abs(x - xp))
         out[i] = x + cs * tau[i]
     return out
@@ -321,18 +333,14 @@ def f_spline(x, a):
     s = kc * x
     for i in range(g.size):
         s += hertz(x, g[i] * gs, k, 1.0)
-    for j in range(J.size):
-        s += cl(J[j] + kj[j] * (x - xp), fr * fj[j])
-    return s
+    return rubbing(s, J, kj, fj, x - xp, fr)
 
 
 @njit
 def f_bellows(x, a):
     xp, J, k1, k3, kj, fj, fr = a
     s = k1 * x + k3 * x * x * x
-    for j in range(J.size):
-        s += cl(J[j] + kj[j] * (x - xp), fr * fj[j])
-    return s
+    return rubbing(s, J, kj, fj, x - xp, fr)
 
 
 @njit
@@ -349,10 +357,8 @@ def run_spline(tau, fr, gs, g, k, kj, fj, kc, k1, k3, kb, fb):
         yp = y
         x = root(f_spline, tau[i], xp, st, (xp, J, g, k, kj, fj, kc, fr[i], gs[i]))
         y = root(f_bellows, tau[i], yp, sy, (yp, B, k1, k3, kb, fb, fr[i]))
-        for j in range(J.size):
-            J[j] = cl(J[j] + kj[j] * (x - xp), fr[i] * fj[j])
-        for j in range(B.size):
-            B[j] = cl(B[j] + kb[j] * (y - yp), fr[i] * fb[j])
+        slide(J, kj, fj, x - xp, fr[i])
+        slide(B, kb, fb, y - yp, fr[i])
         st = max(1e-6, 0.7 * abs(x - xp))
         sy = max(1e-6, 0.7 * abs(y - yp))
         out[i] = x + y
@@ -389,9 +395,7 @@ def f_bevel(x, a):
     y = abs(x) - g * gs - c * z
     f = k * y ** p if y > 0 else 0.0
     s = kc * x + (f if x > 0 else -f)
-    for j in range(Q.size):
-        s += cl(Q[j] + kq[j] * (x - xp), fr * fq[j])
-    return s
+    return rubbing(s, Q, kq, fq, x - xp, fr)
 
 
 @njit
@@ -410,8 +414,7 @@ def run_bevel(tau, fr, gs, kq, fq, kc, g, k, p, c, ta, kz, ksl, f0, mu, cs):
         y = abs(x) - g * gs[i] - c * z
         f = k * y ** p if y > 0 else 0.0
         S = cl(S + ksl * (z - zp), fr[i] * (f0 + mu * f))
-        for j in range(Q.size):
-            Q[j] = cl(Q[j] + kq[j] * (x - xp), fr[i] * fq[j])
+        slide(Q, kq, fq, x - xp, fr[i])
         st = max(1e-6, 0.7 * abs(x - xp))
         out[i] = x + cs * tau[i]
     return out
@@ -466,9 +469,7 @@ def f_split(x, a):
         y = half_y(x, Y[m], V[m], S[m], s, Tp, ks, kj, fj, d, G * gs, k, p, fr)
         tot += s * both_flanks(s * x, d, G * gs, k, p)
         tot -= s * both_flanks(-s * y, d, G * gs, k, p)
-    for j in range(Q.size):
-        tot += cl(Q[j] + kq[j] * (x - xp), fr * fq[j])
-    return tot
+    return rubbing(tot, Q, kq, fq, x - xp, fr)
 
 
 @njit
@@ -490,8 +491,7 @@ def run_split(tau, fr, gs, kq, fq, Tp, ks, kj, fj, d, G, k, p, cs):
             S[m] = cl(S[m] + kj * (v - V[m]), fr[i] * fj)
             V[m] = v
             Y[m] = y
-        for j in range(Q.size):
-            Q[j] = cl(Q[j] + kq[j] * (x - xp), fr[i] * fq[j])
+        slide(Q, kq, fq, x - xp, fr[i])
         st = max(1e-6, 0.7 * abs(x - xp))
         out[i] = x + cs * tau[i]
     return out

@@ -20,7 +20,7 @@ SAME_ZERO = 0.1
 """Middles of loops, in angle scales, that lie closer are read from one zero: drift moves them as far."""
 HARMONICS = 5
 """An interpolation error has harmonics: distorted quadrature signals give the second, flattened ones the third and fourth
-(Heydemann, Appl. Opt. 20, 1981). The k-th is usually 1/k² of the first."""
+(Heydemann, Appl. Opt. 20, 1981), a skewed shape leaves a fifth; eight were no better. The k-th is usually 1/k² of the first."""
 FINE = 9
 """Frequencies about the best one that are tried in turn."""
 NODES = 12

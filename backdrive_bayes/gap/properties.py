@@ -45,7 +45,7 @@ OWN = (0.01, 0.5)
 SOFTENING = (0.05, LARGE)
 """Share of reducers that soften towards full load without a clamp that slips, and by how much."""
 ODDS = -2.86
-"""Log odds that a reducer has one of them."""
+"""Log odds that a reducer has one of them: one in eighteen, as any listed effect where LARGE, OWN and SOFTENING were set."""
 SURE = 0.97
 """No property is more certain than this: thresholds are practical, not physical."""
 

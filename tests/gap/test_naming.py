@@ -105,8 +105,10 @@ def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
 
 
 def test_a_wave_of_one_and_a_half_periods_and_a_soft_flank_are_told_apart_by_their_evidence():
-    wave = weigh(prepare(_waving(1.5))).log_factor
-    assert wave[("encoder_error",)] > wave[("asymmetric_stiffness",)] + 3
+    weighed = weigh(prepare(_waving(1.5)))
+    wave, answers = weighed.log_factor, gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    assert max(wave, key=wave.get) == ("encoder_error",) and wave[("encoder_error",)] > wave[("asymmetric_stiffness",)] + 3
+    assert "encoder_error" in gap.credible_set(answers)
     soft = found("asymmetric_stiffness")[0].log_factor
     assert soft[("asymmetric_stiffness",)] > soft[("encoder_error",)] + 3
 
