@@ -61,7 +61,7 @@ class Template:
         linear = prepare(simulate_unit(known, LOOPS, noise, np.random.default_rng(1)))[0]
         scale = linear.reduced.torque_scale_nm
         grid = torque_grid(scale, (*linear.reducer.knots * scale, LOST_MOTION_AT * scale))
-        growth = linear.distortion.growth(0.0, linear.reduced.context)
+        growth = linear.distortion.growth(0.0, 0.0, linear.reduced.context)
         ends = linear.reducer.ends(settled_history(grid, LOOPS[0][1], scale), growth)
         return cls(linear, linear.design.scales(levels(linear, ())), grid, ends)
 

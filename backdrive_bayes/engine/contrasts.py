@@ -148,7 +148,7 @@ def effect_groups(linear: Linear) -> tuple[Group, ...]:
 
 
 def _class_names(linear):
-    return {p.name for p in linear.reducer.parts}
+    return {p.name for p in linear.reducer.parts} | {e.name for e in linear.effects if e.of_class}
 
 
 def averaged(log_marginals) -> float:

@@ -103,11 +103,16 @@ def histories(reduced: Reduced, distortion: Distortion) -> list[History]:
     return [_history(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
 
 
+def grown_histories(reduced: Reduced, distortion: Distortion) -> list[tuple[History, tuple]]:
+    """The same, each with the growth of thresholds along it."""
+    rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
+    return [(history, distortion.growth(rate + history.surge, history.log_amplitude, reduced.context)) for history, rate in rates]
+
+
 def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion) -> Design:
     """Columns of the class at a distortion."""
     found: dict[str, list] = {}
-    for r, history in enumerate(histories(reduced, distortion)):
-        growth = distortion.growth(reduced.context.log_rate[r], reduced.context)
+    for history, growth in grown_histories(reduced, distortion):
         for name, column in reducer.columns(history, growth).items():
             found.setdefault(name, []).append(column)
     return Design(tuple(Group(n, tuple(c)) for n, c in found.items()))
@@ -115,8 +120,7 @@ def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion
 
 def class_prediction(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, weights) -> list[np.ndarray]:
     """The same times ``weights`` by group, without the columns."""
-    rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
-    return [reducer.predict(history, weights, distortion.growth(rate, reduced.context)) for history, rate in rates]
+    return [reducer.predict(history, weights, growth) for history, growth in grown_histories(reduced, distortion)]
 
 
 def class_priors(reducer: ReducerClass) -> dict[str, tuple[float, float]]:
@@ -135,12 +139,11 @@ def path_group(reduced: Reduced, effect: PathEffect) -> Group:
 def tangent_groups(reduced, reducer, design: Design, distortion, weights, effects: tuple[Effect, ...]) -> tuple[Group, ...]:
     """Columns made of the class's prediction with ``weights``: derivatives by the parameter of every tangent effect that can be
     told, and even counterparts."""
-    base, groups, grown = design.predict(weights), [], None
+    base, groups, growths = design.predict(weights), [], []
+    grown = grown_histories(reduced, distortion)
     for effect in effects:
         if isinstance(effect, FlankEffect):
-            rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
-            columns = (reducer.flank_columns(h, weights, distortion.growth(rate, reduced.context)) for h, rate in rates)
-            groups.append(Group(effect.name, tuple(columns)))
+            groups.append(Group(effect.name, tuple(reducer.flank_columns(h, weights, growth) for h, growth in grown)))
         if isinstance(effect, SpreadEffect):
             groups.append(Group(effect.name, _spread(reduced, reducer, distortion, weights, base)))
         if effect is BENCH_HYSTERESIS:
@@ -148,20 +151,27 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
             # A lag moves the torque by rate times lag, friction of the bench by the same amount at every rate.
             groups.append(Group(effect.name, tuple(c / rate for c, rate in zip(late.columns, reduced.context.rate, strict=True))))
         if isinstance(effect, GrowthEffect):
-            terms = [reduced.context.law(x)[effect.term] for x in reduced.context.log_rate]
-            if np.ptp(terms) > LEAST_LAW:
-                grown = grown or _grown(reduced, reducer, distortion, weights)
-                groups.append(Group(effect.name, tuple(g[:, [effect.part]] * t for g, t in zip(grown, terms, strict=True))))
+            growths.append(effect)
         elif isinstance(effect, TangentEffect):
             moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + STEP})
             there = class_prediction(reduced, reducer, moved, weights)
             groups.append(Group(effect.name, tuple(((a - b) / STEP)[:, None] for a, b in zip(there, base, strict=True))))
+    for part in (0, 1):
+        groups += _growth_groups(reduced, reducer, grown, weights, [e for e in growths if e.part == part])
     return tuple(groups)
 
 
-def _grown(reduced, reducer, distortion, weights):
-    rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
-    return [reducer.grown(history, weights, distortion.growth(rate, reduced.context)) for history, rate in rates]
+def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
+    """Columns of growths of one part's thresholds, of those that can be told."""
+    rates = zip(reduced.context.log_rate, grown, strict=True)
+    laws = [reduced.context.law(rate + history.surge, history.log_amplitude) for rate, (history, _) in rates]
+    told = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in laws])) > LEAST_LAW]
+    columns = [
+        reducer.grown(history, weights, growth, told[0].part, [law[e.term] for e in told])
+        for (history, growth), law in zip(grown, laws, strict=True)
+        if told
+    ]
+    return [Group(e.name, tuple(c[:, None] for c in of)) for e, of in zip(told, zip(*columns, strict=True), strict=True)]
 
 
 DELAYS, SHARES = np.polynomial.laguerre.laggauss(3)

@@ -16,7 +16,7 @@ from backdrive_bayes.engine.reduced import Reduced, reduce_unit
 from backdrive_bayes.engine.sample import sample
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.reducer import BASELINE
-from backdrive_bayes.mechanics.registry import BENCH, all_effects
+from backdrive_bayes.mechanics.registry import BENCH, REDUCER, all_effects
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
@@ -33,7 +33,7 @@ REACHED = 0.03
 
 def library_terms():
     """Every term of every listed effect, and what every bench has."""
-    return (*(term for terms in all_effects().values() for term in terms), *BENCH)
+    return (*(term for terms in all_effects().values() for term in terms), *BENCH, *REDUCER)
 
 
 @one_thread()

@@ -8,15 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from backdrive_bayes.engine.design import LEAST_LAW, Group
+from backdrive_bayes.engine.design import LEAST_LAW, Group, grown_histories
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group
+from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group, rises
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.engine.search import BENDING, LAW, LEAST_APART, STEPS, Search, length
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect
 from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.mechanics.registry import all_effects
 
 TRIAL_STEPS = 2
 BENT = 2.0
@@ -46,7 +47,7 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
         if nearer.log_marginal > waved.log_marginal:
             wave, waved = turned, nearer
         beside, more = learn_wander(waved)
-        if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain:
+        if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain and rises(waved, frequency):
             joint, waves, wandering, gain = waved, (wave,), beside, more
     if gain > 0:
         again = replace(free, reduced=wandering, fixed=(*free.fixed, *waves))
@@ -67,15 +68,16 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     late = max(start.lag_s for start in starts)
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
     bent = _bent(joint, reach)
+    lawless = _by_amplitude(joint, reach)
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
 
     def mode(some: tuple[str, ...]) -> Linear:
         own = replace(free, reduced=joint.reduced, fixed=(*free.fixed, *(waves if WAVE in some else ())), only=some)
-        return own.run(_only(reach, some), STEPS, refine=True, jitter=joint.jitter)
+        return own.run(_only(reach if LAW in some else lawless, some), STEPS, refine=True, jitter=joint.jitter)
 
     apart: dict[tuple[str, ...], Linear] = {}
-    if LAW not in bent and np.ptp(context.log_rate) > LEAST_LAW:
+    if LAW not in bent and any(term.name in joint.design.names for term in all_effects()[LAW]):
         # A creep may stand for all of it.
         apart[(LAW,)] = mode((LAW,))
         bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent
@@ -87,6 +89,18 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
     found = [linear for some, linear in apart.items() if set(some) <= set(bent)]
     return tuple(linear.without(WAVE) for linear in (joint, *found))
+
+
+def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
+    """The same where thresholds follow the amplitude alone, as nearly as that makes them grow as much."""
+    along = grown_histories(joint.reduced, reach)
+    amplitude = np.array([history.log_amplitude for history, _ in along])
+    growth = np.array([[np.mean(g) for g in grown] for _, grown in along])
+    apart = amplitude - amplitude.mean()
+    if np.abs(apart).max() < LEAST_LAW:
+        return reach
+    friction, drag = apart @ growth / (apart @ apart)
+    return replace(reach, friction_amplitude=float(friction), drag_amplitude=float(drag))
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:

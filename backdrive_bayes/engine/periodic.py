@@ -71,6 +71,14 @@ def periodic_group(linear: Linear, frequency: float) -> Group:
     return replace(group, name=WAVE, columns=tuple(c / np.repeat(order**2, 2) for c in group.columns))
 
 
+def rises(linear: Linear, frequency: float) -> bool:
+    """Whether the reading rises with the angle everywhere beside the wave that the linear model holds: one that turns it back is
+    no encoder's, it draws the loop itself anew."""
+    height = np.linalg.norm(linear.weights[WAVE].reshape(-1, HARMONICS, 2), axis=2)
+    steepest = 2.0 * np.pi * frequency * np.max(height @ (1.0 / np.arange(1, HARMONICS + 1)))
+    return bool(steepest < 1.0)
+
+
 def with_wave(linear: Linear, frequency: float) -> Linear:
     """The linear model with a wave of the angle's reading and its harmonics beside."""
     return linear.beside(periodic_group(linear, frequency), AMPLITUDE)

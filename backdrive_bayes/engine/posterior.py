@@ -95,20 +95,20 @@ class Posterior:
 
         ``modules`` restricts the class to some of its modules and leaves out effects.
         """
-        log_rate = self._log_rate(rate_nm_per_s)
+        log_rate = self._log_rate(rate_nm_per_s) + history.surge
         found = np.zeros(())
-        base = self.reducer.ends(history, self.distortion.growth(log_rate, self.context))
+        growth = self.distortion.growth(log_rate, history.log_amplitude, self.context)
+        base = self.reducer.ends(history, growth)
         for name, columns in base.items():
             if modules is None or self.reducer.part(name).module in modules:
                 found = found + self.flat[name] @ columns.T
         if modules is None:
-            found = found + self._effects(history, log_rate, base)
+            found = found + self._effects(history, log_rate, growth, base)
         return found * self.context.angle_scale_rad
 
-    def _effects(self, history, log_rate, base):
+    def _effects(self, history, log_rate, growth, base):
         """What effects of the reducer itself add, (draws, segments) in shares of the angle scale."""
         found, mean = 0.0, {n: self.flat[n].mean(axis=0) for n in base}
-        growth = self.distortion.growth(log_rate, self.context)
         for effect in self.effects:
             if effect.name not in self.flat or not effect.of_reducer:
                 continue
@@ -118,9 +118,10 @@ class Posterior:
                 even = self.reducer.flank_columns(history, mean, growth, ends=True)
                 found = found + self.flat[effect.name] @ even.T
             elif isinstance(effect, GrowthEffect):
-                grown = self.reducer.grown(history, mean, growth, ends=True)[:, effect.part]
+                term = self.context.law(log_rate, history.log_amplitude)[effect.term]
+                (grown,) = self.reducer.grown(history, mean, growth, effect.part, [term], ends=True)
                 away = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter)
-                found = found + np.outer(away * self.context.law(log_rate)[effect.term], grown)
+                found = found + np.outer(away, grown)
         return found
 
     def along(self, time_s, torque_nm) -> np.ndarray:

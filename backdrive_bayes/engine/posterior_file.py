@@ -119,8 +119,9 @@ def _constant(posterior: Posterior) -> dict:
     out["amplitude_nm"] = (("record",), records.amplitude_nm)
     out["relative_rate"] = (("record",), posterior.context.rate)
     out["duration_s"] = (("record",), posterior.context.duration_s)
+    out["relative_amplitude"] = (("record",), posterior.context.amplitude)
     out["knots"] = (("knot",), posterior.reducer.knots)
-    out["thresholds"] = (("threshold",), posterior.reducer.thresholds)
+    out["bearings"] = (("bearing",), posterior.reducer.bearings)
     return out | {name: (("diagnosed",), getattr(found, name)) for name in ("rhat", "bulk_ess", "tail_ess")}
 
 

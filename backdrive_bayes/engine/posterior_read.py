@@ -10,7 +10,7 @@ from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.effect import Context, Distortion
 from backdrive_bayes.mechanics.reducer import ReducerClass
-from backdrive_bayes.mechanics.registry import BENCH, UNKNOWN, all_effects
+from backdrive_bayes.mechanics.registry import BENCH, REDUCER, UNKNOWN, all_effects
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
 from backdrive_bayes.results import read_groups
@@ -42,7 +42,7 @@ def _rebuilt(groups) -> Posterior:
         unit_name=str(about["unit"]),
         data_hashes=tuple(filter(None, str(about["data_sha256"]).split(","))),
         rated_torque_nm=float(about["rated_torque_nm"]),
-        reducer=ReducerClass(constant["knots"].values, tuple(str(about["modules"]).split(",")), constant["thresholds"].values),
+        reducer=ReducerClass(constant["knots"].values, tuple(str(about["modules"]).split(",")), constant["bearings"].values),
         distortion=Distortion(**json.loads(about["distortion"])),
         effects=_effects(str(about["effects"])),
         context=_context(constant, about),
@@ -67,7 +67,7 @@ def _rebuilt(groups) -> Posterior:
 
 
 def _effects(names):
-    known = {e.name: e for terms in (*all_effects().values(), (UNKNOWN,), BENCH) for e in terms}
+    known = {e.name: e for terms in (*all_effects().values(), (UNKNOWN,), BENCH, REDUCER) for e in terms}
     return tuple(known[name] for name in filter(None, names.split(",")))
 
 
@@ -79,6 +79,7 @@ def _context(constant, about) -> Context:
         constant["duration_s"].values,
         float(about["angle_noise"]),
         float(about["torque_noise"]),
+        constant["relative_amplitude"].values,
     )
 
 

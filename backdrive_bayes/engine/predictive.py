@@ -52,7 +52,7 @@ def _departures(posterior: Posterior, record: int) -> np.ndarray:
     context, distortion = posterior.context, posterior.distortion
     blocks, own = posterior.records.blocks[record], posterior.records
     history = of_blocks(blocks, context.torque_scale_nm, distortion.offset, distortion.lag_s)
-    shared = (history, distortion.growth(context.log_rate[record], context))
+    shared = (history, distortion.growth(context.log_rate[record] + history.surge, history.log_amplitude, context))
     columns = posterior.reducer.columns(*shared)
     for effect in posterior.effects:
         if isinstance(effect, PathEffect) and effect.name in posterior.flat:

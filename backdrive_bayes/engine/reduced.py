@@ -89,6 +89,7 @@ class BlockMeans:
             duration,
             float(np.median(angle)) / self.angle_scale_rad,
             max(float(np.median(torque)) / self.torque_scale_nm, 1e-5),
+            np.array([np.abs(b.path_nm).max() for b in self.blocks]) / self.torque_scale_nm,
         )
 
     @cached_property

@@ -15,13 +15,13 @@ from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.reducer import TOP, ReducerClass, place_knots, spaced
+from backdrive_bayes.mechanics.reducer import THRESHOLDS, TOP, ReducerClass, place_knots, spaced
 from backdrive_bayes.mechanics.registry import all_effects
 
 KNOTS, MOST_KNOTS = 60, 140
 """Knots of clearance and free play at first, and refined."""
-MOST_THRESHOLDS, CLOSEST = 46, 0.008
-"""Thresholds of friction at most, and the least distance of refined ones."""
+MOST_BEARINGS, CLOSEST = 5, 0.008
+"""Bearings with thresholds of their own at most, and the least distance of these."""
 LEAST_APART = 0.3
 """Least distance of knots in the torque noise of a sample."""
 CONSPICUOUS = 3.5
@@ -83,9 +83,9 @@ class Search:
                 learnings, jitter = learnings - 1 if found != jitter else 0, found
             covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
             if refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
-                knots, thresholds = _refined(linear)
-                if knots.size + thresholds.size > reducer.knots.size + reducer.thresholds.size:
-                    reducer, weights, refined = ReducerClass(knots, self.modules, thresholds), None, refined + 1
+                knots, bearings = _refined(linear)
+                if knots.size + bearings.size > reducer.knots.size + reducer.bearings.size:
+                    reducer, weights, refined = ReducerClass(knots, self.modules, bearings), None, refined + 1
                     distortion = _towards(distortion, moved, context)
                     continue
             if still and step >= 2 and not learnings:
@@ -97,7 +97,7 @@ class Search:
         torques, context = [], self.reduced.context
         for r, (history, settled) in enumerate(zip(histories(self.reduced, distortion), self.reduced.settled, strict=True)):
             middle = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
-            torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], context)[1]))
+            torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], history.log_amplitude, context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
     def _linear(self, reducer, distortion, weights, covariances, known, jitter, idle):
@@ -131,6 +131,8 @@ class Search:
 
     def _acts(self, effect) -> bool:
         """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these."""
+        if effect.of_class:
+            return True
         if effect is BENCH_HYSTERESIS or self.only is None:
             return effect is not BENCH_HYSTERESIS
         # A creep may stand for a law of the rate: where that acts, it is weighed without.
@@ -166,7 +168,7 @@ def _shift(design, distortion, effects, context):
 def _step(moved, distortion, context):
     """Step in shares of the torque scale; exponents weigh a fiftieth."""
     step = np.array([getattr(moved, n) - getattr(distortion, n) for n in vars(distortion)])
-    return step * [1.0, context.rate.max(), 0.02, 0.02, 0.02, 0.02]
+    return step * [1.0, context.rate.max(), *[0.02] * (step.size - 2)]
 
 
 def length(moved, distortion, context) -> float:
@@ -185,12 +187,12 @@ def _far(laid, distortion, context) -> bool:
 
 
 def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
-    """Knots, and thresholds of friction, with more of both where settled blocks leave a conspicuous residual, the worst first
-    until there are MOST_KNOTS and MOST_THRESHOLDS: a step is crossed at a torque, a slip begins at a distance from the last
-    turning point.
+    """Knots, and bearings with thresholds of their own, with more of both where settled blocks leave a conspicuous residual, the
+    worst first until there are MOST_KNOTS and MOST_BEARINGS: a step is crossed at a torque, a slip begins at a distance from the
+    last turning point.
     """
     reduced, wanted = linear.reduced, []
-    knots, thresholds = linear.reducer.knots, linear.reducer.thresholds
+    knots, bearings = linear.reducer.knots, linear.reducer.bearings
     for blocks, white, settled in zip(reduced.blocks, linear.residuals(), reduced.settled, strict=True):
         low, high = blocks.edges_nm() / reduced.torque_scale_nm
         turn = blocks.turning_nm[blocks.leg] / reduced.torque_scale_nm
@@ -204,7 +206,7 @@ def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
         inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
         finer = spaced(np.r_[inner[inner < TOP], TOP], least)
         knots = finer if finer.size <= MOST_KNOTS else knots
-        for slip in slips[(slips > thresholds[0]) & (slips < thresholds[-1])]:
-            if thresholds.size < MOST_THRESHOLDS and np.abs(thresholds - slip).min() >= CLOSEST:
-                thresholds = np.sort(np.r_[thresholds, slip])
-    return knots, thresholds
+        for slip in slips[(slips > THRESHOLDS[0]) & (slips < THRESHOLDS[-1])]:
+            if bearings.size < MOST_BEARINGS and np.abs(np.r_[THRESHOLDS, bearings] - slip).min() >= CLOSEST:
+                bearings = np.sort(np.r_[bearings, slip])
+    return knots, bearings

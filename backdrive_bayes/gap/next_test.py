@@ -59,8 +59,8 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
     """Angle at the segments' ends that a hypothesis expects, in shares of the angle scale."""
     linear = fitted.linear
     weights, context = linear.design.split(fitted.mean), linear.reduced.context
-    log_rate = float(np.log(rate) - np.log(context.rate).mean())
-    growth = linear.distortion.growth(log_rate, context)
+    log_rate = np.log(rate) - np.log(context.rate).mean() + history.surge
+    growth = linear.distortion.growth(log_rate, history.log_amplitude, context)
     base = linear.reducer.ends(history, growth)
     mean = {n: weights[n] for n in base}
     angle = sum(base[n] @ mean[n] for n in base)
@@ -76,7 +76,8 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
         elif isinstance(effect, FlankEffect):
             angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight
         elif isinstance(effect, GrowthEffect):
-            by = linear.reducer.grown(history, mean, growth, ends=True)[:, effect.part] * context.law(log_rate)[effect.term]
+            term = context.law(log_rate, history.log_amplitude)[effect.term]
+            (by,) = linear.reducer.grown(history, mean, growth, effect.part, [term], ends=True)
             angle = angle + (float(weight[0]) - getattr(linear.distortion, effect.parameter)) * by
         elif isinstance(effect, TangentEffect):
             # The path itself is free of offset and lag: their whole size counts.

@@ -9,11 +9,12 @@ so that the operator is odd.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numba
 import numpy as np
+from scipy import sparse
 
 from backdrive_bayes.mechanics.history import History
 
@@ -27,13 +28,15 @@ START = ("neutral", "upper", "lower")
 class Cells:
     """Odd pairs of cells, arrays of shape (cells,) in shares of the torque scale.
 
-    The response of a pair runs from -width to +width and is divided by ``norm``.
+    The response of a pair runs from -width to +width and is divided by ``norm``. ``growth`` is that of the thresholds along a
+    history, None where they stay.
     """
 
     up: np.ndarray
     down: np.ndarray
     width: np.ndarray
     norm: np.ndarray
+    growth: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -55,6 +58,13 @@ class Cells:
         """Which pairs cross up at positive torques and down at the opposite ones, (cells,)."""
         return (np.abs(self.up + self.down + self.width) <= 1e-8 + 1e-5 * np.abs(self.up)) & (self.up >= 0.0)
 
+    def grown(self, growth) -> Cells:
+        """The cells with every threshold multiplied by exp(``growth``), one logarithm or one at either end of every segment of
+        the histories to come, (2, segments)."""
+        if np.ndim(growth):
+            return replace(self, growth=growth)
+        return self.wider(float(np.exp(growth))) if growth else self
+
     def wider(self, factor: float) -> Cells:
         """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays, and stay
         where they are beyond CROSSED."""
@@ -66,17 +76,32 @@ class Cells:
     def means(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
         that differ)."""
+        if self.growth is not None:
+            return self._paired(_surged(False, *self._surging(history)) @ _shares(history), sign)
         return self._paired(_means(*_segments(history), *self._relays(history.start, history.state)), sign)
 
     def ends(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Responses at the end of every segment, shape (segments, cells)."""
+        if self.growth is not None:
+            return self._paired(_surged(True, *self._surging(history)), sign)
         return self._paired(_ends(history.z1, *self._relays(history.start, history.state)), sign)
 
     def summed(self, history: History, weights, sign: float = 1.0) -> np.ndarray:
         """Block means times ``weights`` (cells,), (blocks,)."""
         share = np.concatenate([weights / self.norm, sign * weights / self.norm])
-        arguments = *_segments(history), *self._relays(history.start, history.state), share
-        return _summed(*arguments) - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
+        if self.growth is not None:
+            found = _surged_sum(share, *self._surging(history)) @ _shares(history)
+        else:
+            arguments = *_segments(history), *self._relays(history.start, history.state), share
+            found = _summed(*arguments)
+        return found - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
+
+    def _surging(self, history):
+        """Torques, factors of the thresholds and all relays whose thresholds grow."""
+        follows = self.clearance & (self.up + self.width <= CROSSED)
+        threshold = np.where(self.clearance, 0.0, self.threshold)
+        relays = self._relays(history.start, history.state)
+        return history.z0, history.z1, *np.exp(self.growth), *relays, np.tile(threshold, 2), np.tile(follows, 2)
 
     @cached_property
     def _both(self):
@@ -100,6 +125,12 @@ class Cells:
         one, other = response[: self.count], response[self.count :]
         width, norm = self.width[:, None], self.norm[:, None]
         return ((one + sign * other - 0.5 * (1.0 + sign) * width) / norm).T
+
+
+def _shares(history):
+    """Shares of the segments in the blocks, sparse (segments, blocks)."""
+    rows = np.arange(history.weight.size)
+    return sparse.csr_array((history.weight, (rows, history.block)), shape=(rows.size, history.blocks))
 
 
 def _segments(history):
@@ -203,3 +234,49 @@ def _ends(z1, up, down, width, first):
             x = min(x, min(max(z1[i] - b, 0.0), w))
             out[j, i] = x
     return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _surged(ends, z0, z1, f0, f1, up, down, width, first, threshold, follows):
+    """States (cells, segments) whose thresholds are multiplied by a factor that runs from f0 to f1 along each segment, means or
+    those at its end."""
+    out = np.empty((up.size, z0.size))
+    for j in range(up.size):
+        _surge(out[j], first[j], z0, z1, f0, f1, up[j], down[j], width[j], threshold[j], follows[j], ends)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _surged_sum(share, z0, z1, f0, f1, up, down, width, first, threshold, follows):
+    """Means of the same times the cells' shares, (segments,)."""
+    mean, total = np.empty(z0.size), np.zeros(z0.size)
+    for j in range(up.size):
+        if share[j] != 0.0:
+            _surge(mean, first[j], z0, z1, f0, f1, up[j], down[j], width[j], threshold[j], follows[j], False)
+            total += share[j] * mean
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _surge(out, x, z0, z1, f0, f1, a, b, w, r, follows, ends):
+    """States (segments,) of one cell: the lower torque of a play rises, and its upper one falls, by what its threshold ``r``
+    loses; a clearance that ``follows`` feels the torque divided by the factor."""
+    for i in range(z0.size):
+        if follows:
+            p0, p1 = z0[i] / f0[i], z1[i] / f1[i]
+            q0, q1 = p0, p1
+        else:
+            less0, less1 = r * (f0[i] - 1.0), r * (f1[i] - 1.0)
+            p0, p1, q0, q1 = z0[i] - less0, z1[i] - less1, z0[i] + less0, z1[i] + less1
+        if i == 0:
+            x = min(max(x, min(p0 - a, w)), max(q0 - b, 0.0))
+        mean = x
+        if p1 > p0 and p1 > a + x and x < w:
+            turn = max(p0, a + x)
+            mean = (x * (turn - p0) + _integral(p1 - a, w) - _integral(turn - a, w)) / (p1 - p0)
+            x = max(x, min(p1 - a, w))
+        elif q1 < q0 and q1 < b + x and x > 0.0:
+            turn = min(q0, b + x)
+            mean = (x * (q0 - turn) + _integral(turn - b, w) - _integral(q1 - b, w)) / (q0 - q1)
+            x = min(x, max(q1 - b, 0.0))
+        out[i] = x if ends else mean

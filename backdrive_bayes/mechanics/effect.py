@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -11,13 +11,15 @@ from backdrive_bayes.mechanics.history import History
 
 MOST_GROWTH = 3.0
 """Log factor of thresholds beyond which no law of the rate is followed."""
+LEAST_GROWTH = 2e-3
+"""Range of that factor along a history below which its mean stands for it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Context:
     """What effects may know of a unit; torques are shares of the largest torque, angles of the angle scale.
 
-    ``rate`` (records,) are loading rates [1/s], ``duration_s`` (records,); ``angle_noise`` and ``torque_noise``
+    ``rate`` (records,) are loading rates [1/s], ``duration_s`` and ``amplitude`` (records,); ``angle_noise`` and ``torque_noise``
     standard deviations
     of block means and of single torque samples.
     """
@@ -28,15 +30,17 @@ class Context:
     duration_s: np.ndarray
     angle_noise: float
     torque_noise: float
+    amplitude: np.ndarray = field(default_factory=lambda: np.ones(1))
 
     @property
     def log_rate(self) -> np.ndarray:
         """Logarithms of the rates over their geometric mean, (records,)."""
         return np.log(self.rate) - np.log(self.rate).mean()
 
-    def law(self, log_rate: float) -> tuple[float, float]:
-        """What an exponent and a bend of a law of the rate are multiplied by; the records' mean bend is none."""
-        return float(log_rate), float(log_rate**2 - np.mean(self.log_rate**2))
+    def law(self, log_rate, log_amplitude: float) -> tuple:
+        """What growths are multiplied by: an exponent and a bend of a law of the rate, each like ``log_rate``, and an exponent of
+        the amplitude; the records' mean is none."""
+        return log_rate, log_rate**2 - np.mean(self.log_rate**2), log_amplitude - float(np.log(self.amplitude).mean())
 
 
 @dataclass(frozen=True)
@@ -44,11 +48,12 @@ class Effect:
     """A candidate effect.
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
-    channel, ``per_record``
-    says whether each record has weights of its own. ``present`` gives the standard deviation of its (independent) weights where
-    it acts; where it is a mere trace, as on every bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
+    channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it.
+    ``present`` gives the standard deviation of its (independent) weights where it acts; where it is a mere trace, as on every
+    bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
 
+    of_class: ClassVar[bool] = False
     name: str
     breaks: str
     signature: str
@@ -86,9 +91,9 @@ class TangentEffect(Effect):
 
 @dataclass(frozen=True)
 class GrowthEffect(TangentEffect):
-    """An effect by which the thresholds of one part follow the rate: the derivative by their growth times a term of the law.
+    """An effect by which the thresholds of one part follow the rate at the moment: the derivative by a term of the law.
 
-    ``part`` is the number of friction (0) or drag (1), ``term`` that of exponent (0) or bend (1).
+    ``part`` is the number of friction (0) or drag (1), ``term`` that of exponent (0), bend (1) or exponent of the amplitude (2).
     """
 
     part: int = 0
@@ -110,7 +115,7 @@ class Distortion:
     """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
 
     ``offset`` is a share of the torque scale, ``lag_s`` in seconds; the logarithms of friction and drag thresholds follow the log
-    of the rate with these exponents and bends.
+    of the rate with these exponents and bends, and that of the amplitude.
     """
 
     offset: float = 0.0
@@ -119,11 +124,18 @@ class Distortion:
     drag_exponent: float = 0.0
     friction_bend: float = 0.0
     drag_bend: float = 0.0
+    friction_amplitude: float = 0.0
+    drag_amplitude: float = 0.0
 
-    def growth(self, log_rate: float, context: Context) -> tuple[float, float]:
-        """Logarithms of the factors of friction and drag thresholds at a rate."""
-        line, bend = context.law(log_rate)
-        growth = np.array([self.friction_exponent, self.drag_exponent]) * line
-        growth += np.array([self.friction_bend, self.drag_bend]) * bend
-        friction, drag = np.clip(growth, -MOST_GROWTH, MOST_GROWTH)
-        return float(friction), float(drag)
+    def growth(self, log_rate, log_amplitude: float, context: Context) -> tuple:
+        """Logarithms of the factors of friction and drag thresholds, each like ``log_rate``: one rate or many."""
+        line, bend, amplitude = context.law(log_rate, log_amplitude)
+        friction = self.friction_exponent * line + self.friction_bend * bend + self.friction_amplitude * amplitude
+        drag = self.drag_exponent * line + self.drag_bend * bend + self.drag_amplitude * amplitude
+        return _bounded(friction), _bounded(drag)
+
+
+def _bounded(growth):
+    """A growth within MOST_GROWTH, one number where it hardly moves."""
+    growth = np.clip(growth, -MOST_GROWTH, MOST_GROWTH)
+    return growth if np.ptp(growth) > LEAST_GROWTH else float(np.mean(growth))

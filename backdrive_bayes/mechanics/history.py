@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba
 import numpy as np
@@ -11,6 +12,12 @@ from backdrive_bayes.records.reduction import FEW, Blocks
 
 PIECES = 3
 """Straight pieces a block: the torque within a block is nearly straight, turning points are nodes of their own."""
+FILM = 0.03
+"""Torque, in shares of the largest, that passes at the usual rate while a film of lubricant takes on a new speed."""
+RESTING = 0.05
+"""Rate, in shares of the usual one, below which a film stays as it is."""
+LEAST_SURGE = 0.05
+"""Range of the log rate along a history below which it has one rate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +26,9 @@ class History:
 
     ``z0`` and ``z1`` are the torques at the ends as shares of the unit's largest torque, ``t0`` and ``t1`` the times
     [s], ``block``
-    the block that a segment belongs to and ``weight`` its share of the block's time. ``state`` is the one of
+    the block that a segment belongs to and ``weight`` its share of the block's time. ``surge`` is the logarithm of the loading
+    rate over the history's mean rate at the segments' ends, (2, segments), or zero where it is the same everywhere. ``state`` is
+    the one of
     :data:`backdrive_bayes.mechanics.cells.START` in which it begins.
     """
 
@@ -30,12 +39,18 @@ class History:
     block: np.ndarray
     weight: np.ndarray
     blocks: int
+    surge: np.ndarray | float = 0.0
     state: str = "neutral"
 
     @property
     def start(self) -> float:
         """Torque before the first segment."""
         return float(self.z0[0])
+
+    @cached_property
+    def log_amplitude(self) -> float:
+        """Logarithm of the largest torque in shares of the unit's."""
+        return float(np.log(max(np.abs(self.z0).max(), np.abs(self.z1).max(), 1e-3)))
 
     def mean(self, begin, end) -> np.ndarray:
         """Block means (blocks, columns) of quantities that are straight on every segment, given at its ends
@@ -65,9 +80,10 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     owner, weight = np.r_[owner, who], np.r_[weight, 1.0 / blocks.count[who]]
     order = np.lexsort((t0, t1))
     z0, z1 = (np.interp(t[order], blocks.path_s, blocks.path_nm) / torque_scale_nm + offset for t in (t0, t1))
+    surge = _surge(blocks.path_s, blocks.path_nm / torque_scale_nm, np.stack([t0[order], t1[order]]))
     # A tip is reached from the other side.
     state = "neutral" if not blocks.begins_at_tip else "lower" if blocks.turning_nm[0] > 0 else "upper"
-    return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size, state)
+    return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size, surge, state)
 
 
 def _samples(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +99,20 @@ def through(time_s, torque_nm, torque_scale_nm: float) -> History:
     """History straight between given samples; segment i ends at sample i + 1 and is a block of its own."""
     z, count = np.asarray(torque_nm, float) / torque_scale_nm, len(torque_nm) - 1
     time = np.asarray(time_s, float)
-    return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count)
+    surge = _surge(time, z, np.stack([time[:-1], time[1:]]))
+    return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count, surge)
+
+
+def _surge(time_s, z, at_s) -> np.ndarray | float:
+    """Logarithm of the loading rate about instants [s] over the mean rate of a path that is straight between ``time_s``."""
+    passed, span = np.r_[0.0, np.cumsum(np.abs(np.diff(z)))], time_s[-1] - time_s[0]
+    if not (span > 0.0 and passed[-1] > 0.0):
+        return 0.0
+    usual = passed[-1] / span
+    begin, end = (np.clip(at_s + sign * FILM / usual, time_s[0], time_s[-1]) for sign in (-1.0, 1.0))
+    rate = (np.interp(end, time_s, passed) - np.interp(begin, time_s, passed)) / np.maximum(end - begin, 1e-300)
+    surge = np.log(np.maximum(rate / usual, RESTING))
+    return surge if np.ptp(surge) > LEAST_SURGE else 0.0
 
 
 @numba.njit(cache=True, nogil=True)

@@ -8,24 +8,36 @@ knots.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
+from scipy.linalg import block_diag, svd
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.mechanics.cells import Cells
-from backdrive_bayes.mechanics.history import History
+from backdrive_bayes.mechanics.cells import Cells, join
+from backdrive_bayes.mechanics.history import History, through
 
 TOP = 1.2
 """Torque up to which cells reach, in the unit's largest: an offset of the torque channel must not leave the class."""
-THRESHOLDS = np.r_[np.geomspace(0.003, 0.12, 10), np.arange(0.16, 0.94, 0.05)]
+THRESHOLDS = np.r_[np.geomspace(0.003, 0.12, 18), np.arange(0.14, 0.94, 0.035)]
 """Thresholds of friction at first; a bearing that slips at one torque bends the loop at one distance from its tips."""
 USUAL_SPACING = float(np.log(1.4))
 """Distance in ln r of neighbouring thresholds for which the prior of friction's weights is meant: closer ones share its
 variance."""
-READ_OUTS = (0.0, 0.04, 0.12, 0.28, 0.5, 0.75, 0.9, 1.0)
-"""Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip."""
+READ_OUTS = (0.0, 0.02, 0.04, 0.07, 0.12, 0.2, 0.28, 0.38, 0.5, 0.62, 0.75, 0.83, 0.9, 0.95, 1.0)
+"""Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip. Both grids are fine, or loops
+of two amplitudes seem to follow the rate."""
+LOOPS = (0.0, 1.0, -1.0, 1.0, -1.0, 0.7, -0.7, 0.5, -0.2, 0.5, -0.5, 0.5, -0.25, 0.25, -0.25, 0.1, -0.1, 1.0)
+"""Turning points of the path on which weights of friction are told apart."""
+NEAR = np.geomspace(1e-3, 0.1, 12)
+"""Distances from zero torque and from turning points, in shares of a leg, at which it is followed beside evenly spaced ones."""
+SEEN = 3e-4
+"""Share of the prior standard deviation of that path below which no more weights are told apart."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
+GROWING = ("friction", "clearance")
+"""Parts whose thresholds follow the rate."""
 GROWTH_STEP = 2e-3
 """Step of the difference quotients by the growth of thresholds."""
 LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
@@ -67,18 +79,20 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ReducerClass:
-    """Parts of the class with clearance knots ``knots`` (rising from 0 to TOP) and rising ``thresholds`` of friction."""
+    """Parts of the class with clearance knots ``knots`` (rising from 0 to TOP) and ``bearings`` that slip at thresholds of their
+    own."""
 
     knots: np.ndarray
     modules: tuple[str, ...] = BASELINE
-    thresholds: np.ndarray = field(default_factory=lambda: THRESHOLDS)
+    bearings: np.ndarray = field(default_factory=lambda: np.empty(0))
     parts: tuple[Part, ...] = field(init=False)
 
     def __post_init__(self):
         unknown = [m for m in self.modules if m not in BASELINE]
         if unknown or "elastic" not in self.modules:
             raise BadInput("--baseline", f"modules out of {', '.join(BASELINE)}, elastic among them", ",".join(self.modules))
-        made = (_compliance(), _elastic(), _friction(self.thresholds), _clearance(self.knots), _free_play(self.knots))
+        friction = _friction(tuple(self.bearings.tolist()))
+        made = (_compliance(), _elastic(), friction, _clearance(self.knots), _free_play(self.knots))
         object.__setattr__(self, "parts", tuple(p for p in made if p.module in self.modules))
 
     def part(self, name: str) -> Part:
@@ -88,40 +102,35 @@ class ReducerClass:
     def columns(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """Block means of every part's columns, (blocks, weights) by name.
 
-        Friction and drag thresholds are multiplied by exp(growth).
+        Friction and drag thresholds are multiplied by exp(growth), either the same everywhere or (2, segments).
         """
-        return {p.name: p.mix(self._cells(p, growth).means(history)) for p in self.parts}
+        return {p.name: p.mix(_cells(p, growth).means(history)) for p in self.parts}
 
-    def grown(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False) -> np.ndarray:
-        """Derivatives of the block means with independent ``weights`` by the growth of friction and of drag, (blocks, 2),
-        or at the segments' ends."""
-        columns = []
-        for k, name in enumerate(("friction", "clearance")):
-            part = self.part(name)
-            if part is None:
-                columns.append(np.zeros(history.z1.size if ends else history.blocks))
-                continue
-            more = tuple(g + GROWTH_STEP * (i == k) for i, g in enumerate(growth))
-            there, here = (_response(self._cells(part, g), history, part.weights(weights[name]), ends) for g in (more, growth))
-            columns.append((there - here) / GROWTH_STEP)
-        return np.stack(columns, axis=1)
+    def grown(self, history: History, weights, growth, part: int, terms, ends: bool = False) -> list[np.ndarray]:
+        """Derivatives of the block means (blocks,) with independent ``weights``, or at the segments' ends, by the growth of
+        friction (0) or of drag (1) in the direction of each of ``terms``, one for all or (2, segments)."""
+        own = self.part(GROWING[part])
+        cells = (own.cells.grown(growth[part] + GROWTH_STEP * term) for term in (0.0, *terms))
+        here, *there = (_response(c, history, own.weights(weights[own.name]), ends) for c in cells)
+        return [(moved - here) / GROWTH_STEP for moved in there]
 
     def ends(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """The same at the end of every segment."""
-        return {p.name: p.mix(self._cells(p, growth).ends(history)) for p in self.parts}
+        return {p.name: p.mix(_cells(p, growth).ends(history)) for p in self.parts}
 
     def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
-        columns = (_response(self._cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
+        columns = (_response(_cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
         return np.stack(list(columns), axis=1)
 
     def predict(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
         """Block means (blocks,) at independent ``weights`` by part: columns times weights without making the columns."""
-        return sum(self._cells(p, growth).summed(history, p.weights(weights[p.name])) for p in self.parts)
+        found = (_cells(p, growth).summed(history, p.weights(weights[p.name])) for p in self.parts)
+        return sum(found, np.zeros(()))
 
-    def _cells(self, part, growth):
-        own = {"friction": growth[0], "clearance": growth[1]}.get(part.name, 0.0)
-        return part.cells.wider(float(np.exp(own))) if own else part.cells
+
+def _cells(part, growth) -> Cells:
+    return part.cells.grown(growth[GROWING.index(part.name)]) if part.name in GROWING else part.cells
 
 
 def _response(cells, history, weights, ends, sign=1.0):
@@ -143,8 +152,17 @@ def _elastic() -> Part:
     return Part("elastic", "elastic", cells, np.linalg.cholesky(np.exp(-_apart(centre) / 0.3)), (float(np.log(0.5)), 1.0))
 
 
-def _friction(thresholds) -> Part:
-    rows, share = [], np.gradient(np.log(thresholds)) / USUAL_SPACING
+@lru_cache(maxsize=8)
+def _friction(bearings: tuple[float, ...]) -> Part:
+    whole = [plays(THRESHOLDS), *(plays((r,)) for r in bearings)]
+    mixing = block_diag(*(told_apart(*one) for one in whole))
+    return Part("friction", "friction", join(*(cells for cells, _ in whole)), mixing, (float(np.log(0.1)), 1.5))
+
+
+def plays(thresholds) -> tuple[Cells, np.ndarray]:
+    """Plays of some thresholds, or of a bearing by itself, and the root of the prior covariance of their weights."""
+    share = np.gradient(np.log(thresholds)) / USUAL_SPACING if len(thresholds) > 1 else (1.0 - SHARED,)
+    rows = []
     for r, part in zip(thresholds, share, strict=True):
         for low, high in zip(READ_OUTS[:-1], READ_OUTS[1:], strict=True):
             if low + r < 1:
@@ -156,8 +174,32 @@ def _friction(thresholds) -> Part:
     one = threshold[:, None] == threshold
     # One bearing by itself may slip at any torque.
     near = SHARED * np.outer(share, share) * near + (1.0 - SHARED) * one * np.sqrt(np.outer(share, share)) * near
-    mixing = np.linalg.cholesky(np.outer(level, level) * near + 1e-9 * np.eye(up.size))
-    return Part("friction", "friction", Cells(up, down, width, np.full(up.size, 2.0)), mixing, (float(np.log(0.1)), 1.5))
+    root = np.linalg.cholesky(np.outer(level, level) * near + 1e-9 * np.eye(up.size))
+    return Cells(up, down, width, np.full(up.size, 2.0)), root
+
+
+def told_apart(cells: Cells, root: np.ndarray) -> np.ndarray:
+    """The same prior as that of ``root`` (cells, cells) by fewer weights, (cells, weights): principal components of the angle
+    along LOOPS."""
+    _, size, turned = svd(cells.ends(loops()) @ root, full_matrices=False)
+    left = np.sqrt(np.cumsum(size[::-1] ** 2))[::-1]
+    kept = turned[left > SEEN * left[0]]
+    signs = np.sign(kept[np.arange(kept.shape[0]), np.argmax(np.abs(kept), axis=1)])
+    return root @ (kept * signs[:, None]).T
+
+
+def loops() -> History:
+    """The path of LOOPS."""
+    path = np.concatenate([_leg(a, b) for a, b in itertools.pairwise(LOOPS)])
+    return through(np.arange(path.size, dtype=float), path, 1.0)
+
+
+def _leg(begin: float, end: float) -> np.ndarray:
+    """Torques from one turning point to the next, close together where loops bend."""
+    share = np.r_[np.linspace(0.0, 1.0, 45)[1:], NEAR]
+    zero = begin / (begin - end)
+    share = np.r_[share, zero - NEAR, zero + NEAR] if 0.0 < zero < 1.0 else share
+    return begin + (end - begin) * np.sort(share[share <= 1.0])
 
 
 def _clearance(knots) -> Part:

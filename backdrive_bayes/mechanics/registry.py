@@ -12,6 +12,7 @@ from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_BEND,
 from backdrive_bayes.mechanics.effects.sensor_lag import LAG_SPREAD, SENSOR_LAG
 from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
 from backdrive_bayes.mechanics.effects.torque_offset import TORQUE_OFFSET
+from backdrive_bayes.mechanics.effects.uncongruent_loops import DRAG_AMPLITUDE, FRICTION_AMPLITUDE
 from backdrive_bayes.mechanics.effects.unexplained import UNEXPLAINED
 from backdrive_bayes.mechanics.effects.viscoelastic_creep import VISCOELASTIC_CREEP
 
@@ -40,5 +41,7 @@ UNKNOWN = UNEXPLAINED
 """The process that stands for what no listed effect explains."""
 BENCH = (BENCH_HYSTERESIS,)
 """What every bench has at trace level and no diagnosis can name."""
+REDUCER = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE)
+"""What every reducer has beside the operator."""
 OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
 """Effects that lie inside the class: any fit holds them."""

@@ -27,17 +27,25 @@ from backdrive_bayes.engine import (
     prediction,
     reduced,
     sample,
+    search,
     traces,
 )
 from backdrive_bayes.gap import examine, probabilities, properties, shrink
 from backdrive_bayes.indicators import same_loop
 from backdrive_bayes.indicators.draws import UNITS
-from backdrive_bayes.mechanics import reducer
-from backdrive_bayes.mechanics.effects import viscoelastic_creep
+from backdrive_bayes.mechanics import history, reducer
+from backdrive_bayes.mechanics.effects import uncongruent_loops, viscoelastic_creep
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records import lines
 
 NUMBERS = {
+    "thresholds": str(reducer.THRESHOLDS.size),
+    "read_outs": str(len(reducer.READ_OUTS) - 1),
+    "seen": f"{reducer.SEEN:g}",
+    "bearings": str(search.MOST_BEARINGS),
+    "film": f"{history.FILM:g}",
+    "resting": f"{history.RESTING:g}",
+    "uncongruent": f"{uncongruent_loops.USUAL:g}",
     "bent": f"{linearise.BENT:g}",
     "harmonics": str(periodic.HARMONICS),
     "shared": f"{reducer.SHARED:g}",

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.planted import MORE, SCALE, UNITS, joint_mode, planted, smooth_reducer
+from support.planted import MORE, SCALE, UNITS, by_hand, joint_mode, planted, smooth_reducer
 
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine import search
@@ -15,10 +15,11 @@ from backdrive_bayes.engine.linearise import linearise
 from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.reduced import Jitter, reduce_unit
 from backdrive_bayes.engine.sample import ABOVE, compress
-from backdrive_bayes.engine.search import BENDING
+from backdrive_bayes.engine.search import BENDING, LAW
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import HALVINGS, ReducerClass
 from backdrive_bayes.mechanics.registry import LIBRARY
@@ -121,7 +122,7 @@ def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
     coarse = mode(engagement=0.05)
     assert coarse.reducer.knots.size <= 10 + HALVINGS < refined.reducer.knots.size
     near, whole = (np.sum(np.abs(m.reducer.knots - 0.05) < 0.03) for m in (refined, coarse)), refined.reducer.knots.size
-    assert np.subtract(*near) >= 0.8 * (whole - coarse.reducer.knots.size)
+    assert np.subtract(*near) >= 0.75 * (whole - coarse.reducer.knots.size)
     assert refined.solution.log_marginal + refined.data.log_volume > coarse.solution.log_marginal + coarse.data.log_volume + 10
 
 
@@ -133,7 +134,7 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     worst[0][first] = 9.0
     monkeypatch.setattr(search, "MOST_KNOTS", clean.reducer.knots.size + 20)
     monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
-    found, thresholds = search._refined(clean)
+    found, bearings = search._refined(clean)
     low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
     assert clean.reducer.knots.size < found.size <= search.MOST_KNOTS
     new = np.setdiff1d(found, clean.reducer.knots)
@@ -142,8 +143,8 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     # The same block slips at half its distance from the last turning point.
     tip = clean.reduced.blocks[0].turning_nm[1] / clean.reduced.torque_scale_nm
     slip = 0.5 * abs(clean.reduced.blocks[0].torque_nm[first] / clean.reduced.torque_scale_nm - tip)
-    more = np.setdiff1d(thresholds, clean.reducer.thresholds)
-    assert 0 < more.size <= search.MOST_THRESHOLDS and np.abs(more - slip).min() < width
+    more = np.setdiff1d(bearings, clean.reducer.bearings)
+    assert 0 < more.size <= search.MOST_BEARINGS and np.abs(more - slip).min() < width
 
 
 def test_nothing_counts_where_the_past_decides(clean):
@@ -208,11 +209,28 @@ def test_friction_that_follows_the_rate_is_found_at_its_own_mode():
     assert [m.distortion.friction_exponent for m in found[1:]] == pytest.approx([0.0, 0.4], abs=0.05)
 
 
-def test_a_law_of_the_rate_that_a_creep_may_stand_for_has_its_own_mode():
-    """Of two rates, the joint mode takes a creep for all of it."""
+def test_a_law_of_the_rate_is_found_though_a_creep_may_stand_for_it():
+    """Of two rates, where the law may act and where it may not."""
     found = linearise(reduce_unit(planted(known=_rough_reducer(6.0), exponent=0.4)), library_terms())
-    joint, *apart = (m.distortion.friction_exponent for m in found)
-    assert joint < 0.1 and max(apart) == pytest.approx(0.4, abs=0.1)
+    exponents = [m.distortion.friction_exponent for m in found]
+    assert max(exponents) == pytest.approx(0.4, abs=0.1) and min(exponents) < 0.1
+
+
+def test_friction_that_follows_the_rate_at_the_moment_is_found_in_records_of_one_mean_rate():
+    """Of none there is next to none."""
+    units = (reduce_unit(by_hand(exponent, _rough_reducer(3.0))) for exponent in (0.4, 0.0))
+    found, none = (joint_mode(unit, library_terms()).distortion.friction_exponent for unit in units)
+    assert found == pytest.approx(0.4, abs=0.1) and abs(none) < 0.03
+
+
+def test_a_law_of_the_rate_is_told_from_one_of_the_amplitude_by_two_rates_of_one_amplitude():
+    """Where the small loop is the fast one, friction may follow either (planted fault)."""
+
+    def factor(*loops):
+        unit = planted(known=_rough_reducer(4.0), exponent=0.4, loops=loops)
+        return weigh(linearise(reduce_unit(unit), library_terms())).log_factor[(LAW,)]
+
+    assert factor((0.1, 0.02), (0.05, 0.1)) < 1.0 and factor((0.1, 0.02), (0.1, 0.1), (0.05, 0.1)) > 30.0
 
 
 def _rough_reducer(times):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.made_posterior import known, made_posterior
 
-from backdrive_bayes.engine.parameters import PARAMETERS, implied_prior, posterior_parameters
+from backdrive_bayes.engine.parameters import PARAMETERS, Operator, implied_prior, posterior_parameters
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
 TORQUE, ANGLE = 0.1, 0.02
@@ -25,7 +25,13 @@ def test_every_parameter_of_a_physical_reducer_is_recovered():
     # Plays of small read-outs have turned long before the rated torque: what yields there is the elastic part.
     assert found["compliance_rated_rad_per_Nm"] == pytest.approx(0.4 * ANGLE / TORQUE, rel=0.02)
     assert found["friction_torque_Nm"] == pytest.approx(0.04 * np.exp(0.5**2 / 2) * TORQUE, rel=0.02)
-    assert found["friction_spread"] == pytest.approx(0.5, rel=0.02) and abs(found["load_friction_ratio"]) < 0.01
+    assert found["friction_spread"] == pytest.approx(0.5, rel=0.02)
+
+
+def test_thresholds_that_no_load_moves_have_no_load_ratio():
+    known_ratio = next(p.of for p in PARAMETERS if p.name == "load_friction_ratio")
+    truth = known(friction=0.3, threshold=0.04, spread=0.5)
+    assert abs(known_ratio(Operator(truth.reducer, {n: w[None] for n, w in truth.weights.items()}, TORQUE, ANGLE, 1.0))[0]) < 0.01
 
 
 @pytest.mark.parametrize(("option", "name"), [("clearance", "clearance_rad"), ("drag", "drag_torque_Nm")])

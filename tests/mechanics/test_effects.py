@@ -63,7 +63,7 @@ def unit(sign=1.0, rates=RATES):
 def weights(seed=3):
     rng = np.random.default_rng(seed)
     found = {p.name: rng.exponential(size=p.cells.count) for p in REDUCER.parts}
-    return {n: np.linalg.solve(m, w) if (m := REDUCER.part(n).mixing) is not None else w for n, w in found.items()}
+    return {n: np.linalg.lstsq(m, w)[0] if (m := REDUCER.part(n).mixing) is not None else w for n, w in found.items()}
 
 
 def of_path(term):

@@ -10,6 +10,7 @@ from backdrive_bayes.bench.known_truth import KnownReducer, physical_reducer
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.mechanics.effect import Context, Distortion
+from backdrive_bayes.mechanics.reducer import loops as usual_loops
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
@@ -38,7 +39,7 @@ def made_posterior(truth=None, loops=LOOPS, spread=0.01, seed=0, name="u", shape
     blocks = tuple(made_blocks(truth, f"record-{i}", r, a, rng) for i, (r, a) in enumerate(loops))
     context = Context(
         truth.torque_scale_nm, truth.angle_scale_rad, rate / truth.torque_scale_nm,
-        np.array([b.end_s[-1] - b.begin_s[0] for b in blocks]), 0.01, 1e-3,
+        np.array([b.end_s[-1] - b.begin_s[0] for b in blocks]), 0.01, 1e-3, amplitude / truth.torque_scale_nm,
     )  # fmt: skip
     return Posterior(
         unit_name=name,
@@ -78,8 +79,11 @@ def made_blocks(truth, name, rate, amplitude, rng, per_leg=30) -> Blocks:
 
 
 def _independent(part, weights):
-    """Independent weights of a part from those of its cells."""
-    return weights if part.mixing is None else np.linalg.solve(part.mixing, weights)
+    """Independent weights of a part that give the loops of the weights of its cells."""
+    if part.mixing is None:
+        return weights
+    columns = part.cells.ends(usual_loops())
+    return np.linalg.lstsq(columns @ part.mixing, columns @ weights, rcond=1e-10)[0]
 
 
 @lru_cache(maxsize=32)

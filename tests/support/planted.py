@@ -12,6 +12,7 @@ from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.search import Search
+from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.records.record import Record, Unit
 
@@ -40,7 +41,16 @@ def smooth_reducer(extra=None) -> KnownReducer:
 
 
 def planted(
-    seed=0, *, known=None, offset_nm=0.0, lag_s=0.0, exponent=0.0, jitter=None, loops=LOOPS, noise=NOISE, **options
+    seed=0,
+    *,
+    known=None,
+    offset_nm=0.0,
+    lag_s=0.0,
+    exponent=0.0,
+    jitter=None,
+    loops=LOOPS,
+    noise=NOISE,
+    **options,
 ) -> Unit:
     """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque, friction
     follows the rate over 0.05 N·m/s with ``exponent``."""
@@ -55,6 +65,25 @@ def planted(
         read = torque - offset_nm + noise.torque_nm * rng.standard_normal(time.size)
         records.append(Record(f"rate-{rate:g}-amplitude-{amplitude:g}.csv", time, read, angle, rate, amplitude))
     return Unit("planted", SCALE, tuple(records))
+
+
+def by_hand(exponent, known, seed=0, noise=NOISE) -> Unit:
+    """Two records of a torque that moves slowly and five times as fast in turn, with friction that follows the rate at the
+    moment."""
+    rng, records = np.random.default_rng(seed + 40), []
+    nodes = SCALE * np.r_[np.linspace(0, 1, 6), np.linspace(1, -1, 11)[1:], np.linspace(-1, 1, 11)[1:]]
+    for name in "ab":
+        corner = np.cumsum(np.r_[0.0, np.where(np.arange(nodes.size - 1) % 2 == (name == "b"), 1.0, 0.2)])
+        time = np.arange(int(corner[-1] * HERTZ)) / HERTZ
+        torque = np.interp(time, corner, nodes)
+        history, angle = through(time, torque, SCALE), np.zeros(time.size)
+        for part in known.reducer.parts:
+            cells = part.cells.grown(exponent * history.surge) if part.name == "friction" else part.cells
+            angle[1:] += known.angle_scale_rad * cells.ends(history) @ known.weights[part.name]
+        angle[0] = angle[1]
+        angle += angle_noise(time.size, 1 / HERTZ, noise, rng)
+        records.append(Record(f"{name}.csv", time, torque + noise.torque_nm * rng.standard_normal(time.size), angle, 0.04, SCALE))
+    return Unit("by hand", SCALE, tuple(records))
 
 
 def changed(unit: Unit, change) -> Unit:
