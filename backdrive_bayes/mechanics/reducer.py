@@ -30,9 +30,10 @@ READ_OUTS = (0.0, 0.02, 0.04, 0.07, 0.12, 0.2, 0.28, 0.38, 0.5, 0.62, 0.75, 0.83
 """Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip. Both grids are fine, or loops
 of two amplitudes seem to follow the rate."""
 LOOPS = (0.0, 1.0, -1.0, 1.0, -1.0, 0.7, -0.7, 0.5, -0.2, 0.5, -0.5, 0.5, -0.25, 0.25, -0.25, 0.1, -0.1, 1.0)
-"""Turning points of the path on which weights of friction are told apart."""
-NEAR = np.geomspace(1e-3, 0.1, 12)
-"""Distances from zero torque and from turning points, in shares of a leg, at which it is followed beside evenly spaced ones."""
+"""Turning points of the path on which weights of friction are told apart: loops of several amplitudes and inner ones."""
+EVENLY, NEAR = 45, np.geomspace(1e-3, 0.1, 12)
+"""Torques of a leg of that path at equal distances, and shares of it next to zero torque and to turning points, where loops
+bend."""
 SEEN = 3e-4
 """Share of the prior standard deviation of that path below which no more weights are told apart."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
@@ -196,7 +197,7 @@ def loops() -> History:
 
 def _leg(begin: float, end: float) -> np.ndarray:
     """Torques from one turning point to the next, close together where loops bend."""
-    share = np.r_[np.linspace(0.0, 1.0, 45)[1:], NEAR]
+    share = np.r_[np.linspace(0.0, 1.0, EVENLY)[1:], NEAR]
     zero = begin / (begin - end)
     share = np.r_[share, zero - NEAR, zero + NEAR] if 0.0 < zero < 1.0 else share
     return begin + (end - begin) * np.sort(share[share <= 1.0])

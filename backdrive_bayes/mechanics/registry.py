@@ -8,11 +8,11 @@ from importlib.metadata import entry_points
 from backdrive_bayes.mechanics.effect import Effect
 from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
+from backdrive_bayes.mechanics.effects.noncongruent_loops import DRAG_AMPLITUDE, FRICTION_AMPLITUDE
 from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_BEND, DRAG_RATE, FRICTION_BEND, FRICTION_RATE
 from backdrive_bayes.mechanics.effects.sensor_lag import LAG_SPREAD, SENSOR_LAG
 from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
 from backdrive_bayes.mechanics.effects.torque_offset import TORQUE_OFFSET
-from backdrive_bayes.mechanics.effects.uncongruent_loops import DRAG_AMPLITUDE, FRICTION_AMPLITUDE
 from backdrive_bayes.mechanics.effects.unexplained import UNEXPLAINED
 from backdrive_bayes.mechanics.effects.viscoelastic_creep import VISCOELASTIC_CREEP
 

@@ -34,7 +34,7 @@ from backdrive_bayes.gap import examine, probabilities, properties, shrink
 from backdrive_bayes.indicators import same_loop
 from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import history, reducer
-from backdrive_bayes.mechanics.effects import uncongruent_loops, viscoelastic_creep
+from backdrive_bayes.mechanics.effects import noncongruent_loops, viscoelastic_creep
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records import lines
 
@@ -45,7 +45,7 @@ NUMBERS = {
     "bearings": str(search.MOST_BEARINGS),
     "film": f"{history.FILM:g}",
     "resting": f"{history.RESTING:g}",
-    "uncongruent": f"{uncongruent_loops.USUAL:g}",
+    "noncongruent": f"{noncongruent_loops.USUAL:g}",
     "bent": f"{linearise.BENT:g}",
     "harmonics": str(periodic.HARMONICS),
     "shared": f"{reducer.SHARED:g}",
