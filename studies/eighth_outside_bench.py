@@ -29,7 +29,7 @@ K_LOST = 0.03
 
 # ------------------------------------------------------------------ kernels: equilibrium along a torque path
 @njit(cache=False)
-def mesh_torque(x, x0, con, jen, qc, qj, lin, fs, nf, asym, dc, commit):
+def mesh_torque(x, x0, commit, con, jen, qc, qj, lin, fs, nf, asym, dc):
     """Torque of a body at angle x: springs, a magnet, two-flank contacts with load-proportional friction, sliders."""
     tot = lin[0] * x + lin[1] * x * x * x
     if lin[2] > 0.0:
@@ -63,45 +63,52 @@ def mesh_torque(x, x0, con, jen, qc, qj, lin, fs, nf, asym, dc, commit):
 
 
 @njit(cache=False)
+def crossing(torque, m, x0, last, tol, most, args):
+    """Angle at which a body that was at x0 carries m: bracketed with a step of about the last one, then regula falsi (Illinois)
+    with every fourth step a bisection, at most so many."""
+    r0 = torque(x0, x0, False, *args) - m
+    if abs(r0) <= tol:
+        return x0
+    step = max(abs(last), 1e-7)
+    a, ra, b, rb = x0, r0, x0, r0
+    for _ in range(80):
+        b = a - step if r0 > 0 else a + step
+        rb = torque(b, x0, False, *args) - m
+        if rb * r0 <= 0.0:
+            break
+        a, ra = b, rb
+        step *= 2.0
+    side = 0
+    x = b
+    for it in range(most):
+        if abs(rb) < tol or abs(b - a) < 1e-12 * (1.0 + abs(b)):
+            return b
+        c = b - rb * (b - a) / (rb - ra) if it % 4 != 3 else 0.5 * (a + b)
+        rc = torque(c, x0, False, *args) - m
+        x = c
+        if abs(rc) < tol:
+            break
+        if rc * rb < 0.0:
+            a, ra = b, rb
+            side = 0
+        else:
+            side += 1
+            if side > 1:
+                ra *= 0.5
+        b, rb = c, rc
+    return x
+
+
+@njit(cache=False)
 def mesh_march(m, fs, nf, dc, asym, con, jen, lin):
     """Angle of a body (see mesh_torque) under the torque path m, from rest."""
     out = np.zeros(m.size)
     qc, qj = np.zeros(con.shape[0]), np.zeros(jen.shape[0])
     x0, last = 0.0, 1e-4
     for j in range(m.size):
-        r0 = mesh_torque(x0, x0, con, jen, qc, qj, lin, fs[j], nf[j], asym, dc[j], False) - m[j]
-        x = x0
-        if abs(r0) > 1e-12:
-            step = max(abs(last), 1e-7)
-            a, ra = x0, r0
-            b, rb = x0, r0
-            for _ in range(80):
-                b = a - step if r0 > 0 else a + step
-                rb = mesh_torque(b, x0, con, jen, qc, qj, lin, fs[j], nf[j], asym, dc[j], False) - m[j]
-                if rb * r0 <= 0.0:
-                    break
-                a, ra = b, rb
-                step *= 2.0
-            side = 0
-            x = b
-            for it in range(100):
-                if abs(rb) < 1e-12 or abs(b - a) < 1e-12 * (1.0 + abs(b)):
-                    x = b
-                    break
-                c = b - rb * (b - a) / (rb - ra) if it % 4 != 3 else 0.5 * (a + b)
-                rc = mesh_torque(c, x0, con, jen, qc, qj, lin, fs[j], nf[j], asym, dc[j], False) - m[j]
-                x = c
-                if abs(rc) < 1e-12:
-                    break
-                if rc * rb < 0.0:
-                    a, ra = b, rb
-                    side = 0
-                else:
-                    side += 1
-                    if side > 1:
-                        ra *= 0.5
-                b, rb = c, rc
-        mesh_torque(x, x0, con, jen, qc, qj, lin, fs[j], nf[j], asym, dc[j], True)
+        args = (con, jen, qc, qj, lin, fs[j], nf[j], asym, dc[j])
+        x = crossing(mesh_torque, m[j], x0, last, 1e-12, 100, args)
+        mesh_torque(x, x0, True, *args)
         if x != x0:
             last = x - x0
         x0 = x
@@ -210,7 +217,7 @@ def sun_residual(x, d0, d1, e, qs, cs, sn, cl, k, ex, ta, ks, kr, lim, asym, dc,
 
 
 @njit(cache=False)
-def sun_torque(x, x0, st, e, qs, qc, qj, cs, sn, cl, prm, jen, fs, asym, dc, g, jac, frc, commit):
+def sun_torque(x, x0, commit, st, e, qs, qc, qj, cs, sn, cl, prm, jen, fs, asym, dc, g, jac, frc):
     """Torque of the planetary stage at sun rotation x; the sun finds its place between the planets (damped Newton)."""
     k, ex, ta, ks, kr, lim, kw, mu, kt = prm
     d0, d1 = st[0], st[1]
@@ -266,38 +273,9 @@ def sun_march(m, fs, dc, asym, ang, cl, prm, jen):
     out = np.zeros(m.size)
     x0, last = 0.0, 1e-4
     for j in range(m.size):
-        r0 = sun_torque(x0, x0, st, e, qs, qc, qj, cs, sn, cl, prm, jen, fs[j], asym, dc[j], g, jac, frc, False) - m[j]
-        x = x0
-        if abs(r0) > 1e-11:
-            step = max(abs(last), 1e-7)
-            a, ra, b, rb = x0, r0, x0, r0
-            for _ in range(80):
-                b = a - step if r0 > 0 else a + step
-                rb = sun_torque(b, x0, st, e, qs, qc, qj, cs, sn, cl, prm, jen, fs[j], asym, dc[j], g, jac, frc, False) - m[j]
-                if rb * r0 <= 0.0:
-                    break
-                a, ra = b, rb
-                step *= 2.0
-            side = 0
-            x = b
-            for it in range(80):
-                if abs(rb) < 1e-11 or abs(b - a) < 1e-12 * (1.0 + abs(b)):
-                    x = b
-                    break
-                c = b - rb * (b - a) / (rb - ra) if it % 4 != 3 else 0.5 * (a + b)
-                rc = sun_torque(c, x0, st, e, qs, qc, qj, cs, sn, cl, prm, jen, fs[j], asym, dc[j], g, jac, frc, False) - m[j]
-                x = c
-                if abs(rc) < 1e-11:
-                    break
-                if rc * rb < 0.0:
-                    a, ra = b, rb
-                    side = 0
-                else:
-                    side += 1
-                    if side > 1:
-                        ra *= 0.5
-                b, rb = c, rc
-        sun_torque(x, x0, st, e, qs, qc, qj, cs, sn, cl, prm, jen, fs[j], asym, dc[j], g, jac, frc, True)
+        args = (st, e, qs, qc, qj, cs, sn, cl, prm, jen, fs[j], asym, dc[j], g, jac, frc)
+        x = crossing(sun_torque, m[j], x0, last, 1e-11, 80, args)
+        sun_torque(x, x0, True, *args)
         if x != x0:
             last = x - x0
         x0 = x

@@ -20,13 +20,11 @@ from backdrive_bayes.mechanics.effect import (
     TangentEffect,
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.history import History, of_blocks
+from backdrive_bayes.mechanics.history import LEAST_RANGE, History, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
 STEP = 2e-5
 """Step of the difference quotients by offset and lag."""
-LEAST_LAW = 0.05
-"""Range of a term of the rate's law, over the records, below which nothing is known of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,16 +160,16 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
 
 
 def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
-    """Columns of growths of one part's thresholds, of those that can be told."""
+    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify."""
     rates = zip(reduced.context.log_rate, grown, strict=True)
     laws = [reduced.context.law(rate + history.surge, history.log_amplitude) for rate, (history, _) in rates]
-    told = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in laws])) > LEAST_LAW]
+    identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in laws])) > LEAST_RANGE]
     columns = [
-        reducer.grown(history, weights, growth, told[0].part, [law[e.term] for e in told])
+        reducer.grown(history, weights, growth, identified[0].part, [law[e.term] for e in identified])
         for (history, growth), law in zip(grown, laws, strict=True)
-        if told
+        if identified
     ]
-    return [Group(e.name, tuple(c[:, None] for c in of)) for e, of in zip(told, zip(*columns, strict=True), strict=True)]
+    return [Group(e.name, tuple(c[:, None] for c in of)) for e, of in zip(identified, zip(*columns, strict=True), strict=True)]
 
 
 DELAYS, SHARES = np.polynomial.laguerre.laggauss(3)

@@ -16,7 +16,7 @@ from backdrive_bayes.engine.reduced import Reduced, reduce_unit
 from backdrive_bayes.engine.sample import sample
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.reducer import BASELINE
-from backdrive_bayes.mechanics.registry import BENCH, REDUCER, all_effects
+from backdrive_bayes.mechanics.registry import library_terms
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
@@ -29,11 +29,6 @@ POWERS = tuple(POWER * 2.0 * gammaincinv(POWER_DOF / 2.0, (np.arange(POWER_LEVEL
 
 REACHED = 0.03
 """Share by which the amplitude that was reached may miss the declared one."""
-
-
-def library_terms():
-    """Every term of every listed effect, and what every bench has."""
-    return (*(term for terms in all_effects().values() for term in terms), *BENCH, *REDUCER)
 
 
 @one_thread()

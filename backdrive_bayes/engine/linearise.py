@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from backdrive_bayes.engine.design import LEAST_LAW, Group, grown_histories
+from backdrive_bayes.engine.design import Group, grown_histories
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group, rises
 from backdrive_bayes.engine.reduced import Reduced
@@ -16,6 +16,7 @@ from backdrive_bayes.engine.search import BENDING, LAW, LEAST_APART, STEPS, Sear
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect
+from backdrive_bayes.mechanics.history import LEAST_RANGE
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.mechanics.registry import all_effects
 
@@ -97,7 +98,7 @@ def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
     amplitude = np.array([history.log_amplitude for history, _ in along])
     growth = np.array([[np.mean(g) for g in grown] for _, grown in along])
     apart = amplitude - amplitude.mean()
-    if np.abs(apart).max() < LEAST_LAW:
+    if np.abs(apart).max() < LEAST_RANGE:
         return reach
     friction, drag = apart @ growth / (apart @ apart)
     return replace(reach, friction_amplitude=float(friction), drag_amplitude=float(drag))

@@ -10,7 +10,7 @@ from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.effect import Context, Distortion
 from backdrive_bayes.mechanics.reducer import ReducerClass
-from backdrive_bayes.mechanics.registry import BENCH, REDUCER, UNKNOWN, all_effects
+from backdrive_bayes.mechanics.registry import UNKNOWN, library_terms
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks
 from backdrive_bayes.results import read_groups
@@ -67,7 +67,7 @@ def _rebuilt(groups) -> Posterior:
 
 
 def _effects(names):
-    known = {e.name: e for terms in (*all_effects().values(), (UNKNOWN,), BENCH, REDUCER) for e in terms}
+    known = {term.name: term for term in (*library_terms(), UNKNOWN)}
     return tuple(known[name] for name in filter(None, names.split(",")))
 
 

@@ -16,8 +16,9 @@ FILM = 0.03
 """Torque, in shares of the largest, that passes at the usual rate while a film of lubricant takes on a new speed."""
 RESTING = 0.05
 """Rate, in shares of the usual one, below which a film stays as it is."""
-LEAST_SURGE = 0.05
-"""Range of the log rate along a history below which it has one rate."""
+LEAST_RANGE = 0.05
+"""Range of a logarithm of rate or amplitude, and of what a law makes of it, below which it counts as one value: nothing is learnt
+of the law from it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,7 @@ def _surge(time_s, z, at_s) -> np.ndarray | float:
     begin, end = (np.clip(at_s + sign * FILM / usual, time_s[0], time_s[-1]) for sign in (-1.0, 1.0))
     rate = (np.interp(end, time_s, passed) - np.interp(begin, time_s, passed)) / np.maximum(end - begin, 1e-300)
     surge = np.log(np.maximum(rate / usual, RESTING))
-    return surge if np.ptp(surge) > LEAST_SURGE else 0.0
+    return surge if np.ptp(surge) > LEAST_RANGE else 0.0
 
 
 @numba.njit(cache=True, nogil=True)

@@ -22,7 +22,8 @@ from backdrive_bayes.mechanics.history import History, through
 TOP = 1.2
 """Torque up to which cells reach, in the unit's largest: an offset of the torque channel must not leave the class."""
 THRESHOLDS = np.r_[np.geomspace(0.003, 0.12, 18), np.arange(0.14, 0.94, 0.035)]
-"""Thresholds of friction at first; a bearing that slips at one torque bends the loop at one distance from its tips."""
+"""Thresholds of friction; a bearing that slips at one torque bends the loop at one distance from its tips, so one more may be
+placed between them."""
 USUAL_SPACING = float(np.log(1.4))
 """Distance in ln r of neighbouring thresholds for which the prior of friction's weights is meant: closer ones share its
 variance."""
@@ -30,15 +31,16 @@ READ_OUTS = (0.0, 0.02, 0.04, 0.07, 0.12, 0.2, 0.28, 0.38, 0.5, 0.62, 0.75, 0.83
 """Nodes of friction's read-outs; they must reach the largest torque, or clean loops seem to slip. Both grids are fine, or loops
 of two amplitudes seem to follow the rate."""
 LOOPS = (0.0, 1.0, -1.0, 1.0, -1.0, 0.7, -0.7, 0.5, -0.2, 0.5, -0.5, 0.5, -0.25, 0.25, -0.25, 0.1, -0.1, 1.0)
-"""Turning points of the path on which weights of friction are told apart: loops of several amplitudes and inner ones."""
+"""Turning points of the path whose angles decide which combinations of friction's weights are identified: loops of several
+amplitudes and inner ones."""
 EVENLY, NEAR = 45, np.geomspace(1e-3, 0.1, 12)
 """Torques of a leg of that path at equal distances, and shares of it next to zero torque and to turning points, where loops
 bend."""
-SEEN = 3e-4
-"""Share of the prior standard deviation of that path below which no more weights are told apart."""
+LEFT_OUT = 3e-4
+"""Share of the prior standard deviation of that path's angle which principal components that are left out have together."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
 GROWING = ("friction", "clearance")
-"""Parts whose thresholds follow the rate."""
+"""Parts whose thresholds follow the rate and the amplitude."""
 GROWTH_STEP = 2e-3
 """Step of the difference quotients by the growth of thresholds."""
 LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
@@ -156,7 +158,7 @@ def _elastic() -> Part:
 @lru_cache(maxsize=8)
 def _friction(bearings: tuple[float, ...]) -> Part:
     whole = [plays(THRESHOLDS), *(plays((r,)) for r in bearings)]
-    mixing = block_diag(*(told_apart(*one) for one in whole))
+    mixing = block_diag(*(principal_components(*one) for one in whole))
     return Part("friction", "friction", join(*(cells for cells, _ in whole)), mixing, (float(np.log(0.1)), 1.5))
 
 
@@ -179,12 +181,12 @@ def plays(thresholds) -> tuple[Cells, np.ndarray]:
     return Cells(up, down, width, np.full(up.size, 2.0)), root
 
 
-def told_apart(cells: Cells, root: np.ndarray) -> np.ndarray:
+def principal_components(cells: Cells, root: np.ndarray) -> np.ndarray:
     """The same prior as that of ``root`` (cells, cells) by fewer weights, (cells, weights): principal components of the angle
     along LOOPS."""
     _, size, turned = svd(cells.ends(loops()) @ root, full_matrices=False)
     left = np.sqrt(np.cumsum(size[::-1] ** 2))[::-1]
-    kept = turned[left > SEEN * left[0]]
+    kept = turned[left > LEFT_OUT * left[0]]
     signs = np.sign(kept[np.arange(kept.shape[0]), np.argmax(np.abs(kept), axis=1)])
     return root @ (kept * signs[:, None]).T
 

@@ -41,7 +41,12 @@ UNKNOWN = UNEXPLAINED
 """The process that stands for what no listed effect explains."""
 BENCH = (BENCH_HYSTERESIS,)
 """What every bench has at trace level and no diagnosis can name."""
-REDUCER = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE)
-"""What every reducer has beside the operator."""
+NONCONGRUENT = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE)
+"""What every reducer has at trace level beside the operator: loops of other amplitudes are not quite congruent."""
 OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
 """Effects that lie inside the class: any fit holds them."""
+
+
+def library_terms() -> tuple[Effect, ...]:
+    """Every term of every listed effect, what every bench has and what every reducer has."""
+    return (*(term for terms in all_effects().values() for term in terms), *BENCH, *NONCONGRUENT)

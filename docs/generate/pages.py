@@ -41,7 +41,7 @@ from backdrive_bayes.records import lines
 NUMBERS = {
     "thresholds": str(reducer.THRESHOLDS.size),
     "read_outs": str(len(reducer.READ_OUTS) - 1),
-    "seen": f"{reducer.SEEN:g}",
+    "seen": f"{reducer.LEFT_OUT:g}",
     "bearings": str(search.MOST_BEARINGS),
     "film": f"{history.FILM:g}",
     "resting": f"{history.RESTING:g}",

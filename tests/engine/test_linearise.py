@@ -9,7 +9,7 @@ from support.planted import MORE, SCALE, UNITS, by_hand, joint_mode, planted, sm
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine import search
 from backdrive_bayes.engine.design import class_groups, class_priors
-from backdrive_bayes.engine.infer import library_terms, prepare
+from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.jitter import learn_jitter
 from backdrive_bayes.engine.linearise import linearise
 from backdrive_bayes.engine.marginal import find_scales, whiten
@@ -22,7 +22,7 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import HALVINGS, ReducerClass
-from backdrive_bayes.mechanics.registry import LIBRARY
+from backdrive_bayes.mechanics.registry import LIBRARY, library_terms
 
 
 def mode(**options):

@@ -12,10 +12,11 @@ from support.planted import joint_mode, planted
 from backdrive_bayes.bench.known_truth import BenchNoise, random_reducer, simulate_unit
 from backdrive_bayes.engine import infer as module
 from backdrive_bayes.engine import proposal, sample
-from backdrive_bayes.engine.infer import infer, library_terms
+from backdrive_bayes.engine.infer import infer
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.indicators.draws import IndicatorDraws, core_indicators
 from backdrive_bayes.indicators.loop import cut_loops, settled_history
+from backdrive_bayes.mechanics.registry import library_terms
 from backdrive_bayes.records.record import Unit
 
 UNITS, LEVEL, AMPLITUDE, RATE, K = 40, 0.9, 0.1, 0.1, 0.03

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from support.planted import planted
 
-from backdrive_bayes.engine.infer import library_terms, prepare
+from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.linearise import linearise
 from backdrive_bayes.engine.periodic import wave_group
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.engine.traces import ABOVE, TRACE, sample_noise, trace_levels, usual_level, wave_trace
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
+from backdrive_bayes.mechanics.registry import library_terms
 
 
 @pytest.fixture(scope="module")

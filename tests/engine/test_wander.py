@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise, physical_reducer, simulate_unit
-from backdrive_bayes.engine.infer import library_terms
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.engine.search import STEPS, Search
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.mechanics.registry import library_terms
 
 SIZE, TIME = 1e-4, 0.1
 """Of the planted wander: its standard deviation [rad], and its correlation time in shares of a leg."""

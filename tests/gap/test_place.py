@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from support.planted import joint_mode, planted, prepared, smooth_reducer, stepped
 
-from backdrive_bayes.engine.infer import library_terms, prepare
+from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.gap import examine, next_test, where
 from backdrive_bayes.gap.shrink import _alone, closed_fraction, fit_hypothesis, shrink, within_reach
+from backdrive_bayes.mechanics.registry import library_terms
 
 
 @cache

@@ -7,7 +7,16 @@ import pytest
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.cells import Cells
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import BASELINE, THRESHOLDS, TOP, ReducerClass, place_knots, plays, spaced, told_apart
+from backdrive_bayes.mechanics.reducer import (
+    BASELINE,
+    THRESHOLDS,
+    TOP,
+    ReducerClass,
+    place_knots,
+    plays,
+    principal_components,
+    spaced,
+)
 
 KNOTS = np.r_[0.0, np.geomspace(0.01, TOP, 20)]
 REDUCER = ReducerClass(KNOTS)
@@ -39,7 +48,7 @@ def test_the_prior_of_every_part_has_its_covariance_from_mixing():
 def test_friction_has_the_loops_of_its_prior_with_fewer_weights():
     """On a path that was not used to tell its weights apart; half of the weights are not enough (planted fault)."""
     cells, root = plays(THRESHOLDS)
-    history, mixing = ramp(0.0, -0.9, 0.6, -0.4, 0.3, -0.9, 0.9), told_apart(cells, root)
+    history, mixing = ramp(0.0, -0.9, 0.6, -0.4, 0.3, -0.9, 0.9), principal_components(cells, root)
     whole, fewer, half = (np.sum((cells.ends(history) @ m) ** 2) for m in (root, mixing, mixing[:, : mixing.shape[1] // 2]))
     assert mixing.shape[1] < 0.4 * cells.count
     assert whole - fewer < 1e-5 * whole < whole - half
