@@ -74,7 +74,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
 
     def mode(some: tuple[str, ...]) -> Linear:
-        own = replace(free, reduced=joint.reduced, fixed=(*free.fixed, *(waves if WAVE in some else ())), only=some)
+        fixed = (*free.fixed, *(waves if WAVE in some else ()))
+        own = replace(free, reduced=joint.reduced, fixed=fixed, only=some, ratios=joint.reducer.ratios)
         return own.run(_only(reach if LAW in some else lawless, some), STEPS, refine=True, jitter=joint.jitter)
 
     apart: dict[tuple[str, ...], Linear] = {}

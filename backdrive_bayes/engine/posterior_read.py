@@ -42,7 +42,12 @@ def _rebuilt(groups) -> Posterior:
         unit_name=str(about["unit"]),
         data_hashes=tuple(filter(None, str(about["data_sha256"]).split(","))),
         rated_torque_nm=float(about["rated_torque_nm"]),
-        reducer=ReducerClass(constant["knots"].values, tuple(str(about["modules"]).split(",")), constant["bearings"].values),
+        reducer=ReducerClass(
+            constant["knots"].values,
+            tuple(str(about["modules"]).split(",")),
+            constant["bearings"].values,
+            constant["flank_ratios"].values,
+        ),
         distortion=Distortion(**json.loads(about["distortion"])),
         effects=_effects(str(about["effects"])),
         context=_context(constant, about),

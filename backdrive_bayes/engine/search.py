@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from backdrive_bayes.engine.design import Group, class_groups, class_priors, histories, path_group, tangent_groups
+from backdrive_bayes.engine.flanks import with_flank
 from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales, whiten
@@ -22,6 +23,8 @@ KNOTS, MOST_KNOTS = 60, 140
 """Knots of clearance and free play at first, and refined."""
 MOST_BEARINGS, CLOSEST = 5, 0.008
 """Bearings with thresholds of their own at most, and the least distance of these."""
+FIRST_FLANK, MOST_FLANKS = 2, 3
+"""Step from which flanks are sought, before the jitter could stand for them, and how many at most."""
 LEAST_APART = 0.3
 """Least distance of knots in the torque noise of a sample."""
 CONSPICUOUS = 3.5
@@ -45,13 +48,15 @@ WIDE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The search for a mode beside ``fixed`` columns; of what bends the prediction ``only`` these may act, all by default."""
+    """The search for a mode beside ``fixed`` columns, from a class with flanks of these ``ratios``; of what bends the prediction
+    ``only`` these may act, all by default."""
 
     reduced: Reduced
     effects: tuple[Effect, ...]
     modules: tuple[str, ...]
     fixed: tuple[Group, ...]
     only: tuple[str, ...] | None = None
+    ratios: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def over(cls, reduced: Reduced, effects: tuple[Effect, ...], modules: tuple[str, ...]) -> Search:
@@ -64,12 +69,13 @@ class Search:
         jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
         learnings = LEARNINGS if refine else 0
         covariances = reduced.covariances(reduced.read_slopes, jitter)
-        laid, weights, refined = None, None, 0
+        laid, weights, refined, seeking = None, None, 0, "friction" in self.modules
         known: dict[str, float] = {}
+        ratios = self.ratios
         idle: set[str] = set()
         for step in range(steps):
             if laid is None or (not refined and _far(laid, distortion, context)):
-                laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules), None
+                laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules, ratios=ratios), None
             if weights is None:
                 design = class_groups(reduced, reducer, distortion).joined(*self.fixed)
                 weights = design.split(self._solve(reducer, design, reduced.angles, covariances, known)[2].mean)
@@ -82,12 +88,17 @@ class Search:
                 found = learn_jitter(linear)
                 learnings, jitter = learnings - 1 if found != jitter else 0, found
             covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
-            if refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
-                knots, bearings = _refined(linear)
-                if knots.size + bearings.size > reducer.knots.size + reducer.bearings.size:
-                    reducer, weights, refined = ReducerClass(knots, self.modules, bearings), None, refined + 1
-                    distortion = _towards(distortion, moved, context)
-                    continue
+            finer = reducer
+            if refine and step >= FIRST_FLANK and seeking and ratios.size < MOST_FLANKS:
+                ratios = with_flank(linear)
+                seeking = ratios.size > reducer.ratios.size
+                finer = replace(reducer, ratios=ratios)
+            elif refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
+                finer, refined = _refined(linear), refined + 1
+            if finer.richness > reducer.richness:
+                reducer, weights = finer, None
+                distortion = _towards(distortion, moved, context)
+                continue
             if still and step >= 2 and not learnings:
                 break
             distortion = _towards(distortion, moved, context)
@@ -186,10 +197,9 @@ def _far(laid, distortion, context) -> bool:
     return length(laid, distortion, context) > LEAST_APART * context.torque_noise
 
 
-def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
-    """Knots, and bearings with thresholds of their own, with more of both where settled blocks leave a conspicuous residual, the
-    worst first until there are MOST_KNOTS and MOST_BEARINGS: a step is crossed at a torque, a slip begins at a distance from the
-    last turning point.
+def _refined(linear) -> ReducerClass:
+    """The class with more knots and bearings where settled blocks leave a conspicuous residual, the worst first until there are
+    MOST_KNOTS and MOST_BEARINGS: a step is crossed at a torque, a slip begins at a distance from the last turning point.
     """
     reduced, wanted = linear.reduced, []
     knots, bearings = linear.reducer.knots, linear.reducer.bearings
@@ -209,4 +219,4 @@ def _refined(linear) -> tuple[np.ndarray, np.ndarray]:
         for slip in slips[(slips > THRESHOLDS[0]) & (slips < THRESHOLDS[-1])]:
             if bearings.size < MOST_BEARINGS and np.abs(np.r_[THRESHOLDS, bearings] - slip).min() >= CLOSEST:
                 bearings = np.sort(np.r_[bearings, slip])
-    return knots, bearings
+    return replace(linear.reducer, knots=knots, bearings=bearings)

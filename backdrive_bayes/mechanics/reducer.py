@@ -1,7 +1,8 @@
 """The class of clean reducers: odd, rate-independent hysteresis operators, linear in their weights.
 
 Five parts share the Preisach plane: a constant compliance, smooth elasticity beside it, friction (play operators over thresholds
-and read-outs), clearance (relays that cross at +a and back at -a, each tooth at its own a) and free play (steps without drag).
+and read-outs, and flanks whose friction is in proportion to their load), clearance (relays that cross at +a and back at -a, each
+tooth at its own a) and free play (steps without drag).
 Clearance and free play are refined where the loops are steep; together they hold any odd settled loop at the resolution of their
 knots.
 """
@@ -39,6 +40,10 @@ bend."""
 LEFT_OUT = 3e-4
 """Share of the prior standard deviation of that path's angle which principal components that are left out have together."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
+FLANK_SHARE, FLANK_ALIKE = 0.1, 0.3
+"""Usual compliance of a flank in that of all friction, and the correlation's length of it over the root of the load."""
+FLANK_NODES = np.r_[np.linspace(0.0, 1.0, 26)[:-1] ** 1.5, TOP]
+"""Torques between which the compliance of a flank is even."""
 GROWING = ("friction", "clearance")
 """Parts whose thresholds follow the rate and the amplitude."""
 GROWTH_STEP = 2e-3
@@ -82,21 +87,27 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ReducerClass:
-    """Parts of the class with clearance knots ``knots`` (rising from 0 to TOP) and ``bearings`` that slip at thresholds of their
-    own."""
+    """Parts of the class with clearance knots ``knots`` (rising from 0 to TOP), ``bearings`` that slip at thresholds of their
+    own, and flanks that slip back at ``ratios`` of the torque at which they slipped forth."""
 
     knots: np.ndarray
     modules: tuple[str, ...] = BASELINE
     bearings: np.ndarray = field(default_factory=lambda: np.empty(0))
+    ratios: np.ndarray = field(default_factory=lambda: np.empty(0))
     parts: tuple[Part, ...] = field(init=False)
 
     def __post_init__(self):
         unknown = [m for m in self.modules if m not in BASELINE]
         if unknown or "elastic" not in self.modules:
             raise BadInput("--baseline", f"modules out of {', '.join(BASELINE)}, elastic among them", ",".join(self.modules))
-        friction = _friction(tuple(self.bearings.tolist()))
+        friction = _friction(tuple(self.bearings.tolist()), tuple(self.ratios.tolist()))
         made = (_compliance(), _elastic(), friction, _clearance(self.knots), _free_play(self.knots))
         object.__setattr__(self, "parts", tuple(p for p in made if p.module in self.modules))
+
+    @property
+    def richness(self) -> int:
+        """Number of knots, bearings and ratios."""
+        return self.knots.size + self.bearings.size + self.ratios.size
 
     def part(self, name: str) -> Part:
         """A part by name; its module must not be left out."""
@@ -156,10 +167,11 @@ def _elastic() -> Part:
 
 
 @lru_cache(maxsize=8)
-def _friction(bearings: tuple[float, ...]) -> Part:
+def _friction(bearings: tuple[float, ...], ratios: tuple[float, ...]) -> Part:
     whole = [plays(THRESHOLDS), *(plays((r,)) for r in bearings)]
-    mixing = block_diag(*(principal_components(*one) for one in whole))
-    return Part("friction", "friction", join(*(cells for cells, _ in whole)), mixing, (float(np.log(0.1)), 1.5))
+    flanks = [flank(ratio) for ratio in ratios]
+    mixing = block_diag(*(principal_components(*one) for one in whole), *(mixing for _, mixing in flanks))
+    return Part("friction", "friction", join(*(cells for cells, _ in (*whole, *flanks))), mixing, (float(np.log(0.1)), 1.5))
 
 
 def plays(thresholds) -> tuple[Cells, np.ndarray]:
@@ -179,6 +191,17 @@ def plays(thresholds) -> tuple[Cells, np.ndarray]:
     near = SHARED * np.outer(share, share) * near + (1.0 - SHARED) * one * np.sqrt(np.outer(share, share)) * near
     root = np.linalg.cholesky(np.outer(level, level) * near + 1e-9 * np.eye(up.size))
     return Cells(up, down, width, np.full(up.size, 2.0)), root
+
+
+@lru_cache(maxsize=128)
+def flank(ratio: float) -> tuple[Cells, np.ndarray]:
+    """A flank with Coulomb friction in proportion to its load, which slips back at ``ratio`` of the torque at which it slipped
+    forth, (1 - m)/(1 + m) for friction m of the load; and its prior by few weights, (cells, weights)."""
+    up, width = FLANK_NODES[:-1], np.diff(FLANK_NODES)
+    down = np.minimum(ratio * FLANK_NODES[1:], ratio * up)
+    cells = Cells(up, down, width, np.full(width.size, 2.0), abs(ratio) * width)
+    near = np.exp(-_apart(np.sqrt(up + 0.5 * width)) / FLANK_ALIKE)
+    return cells, principal_components(cells, FLANK_SHARE * np.linalg.cholesky(near))
 
 
 def principal_components(cells: Cells, root: np.ndarray) -> np.ndarray:

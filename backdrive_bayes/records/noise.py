@@ -21,11 +21,11 @@ PRIOR_SD = np.array([4.0, 4.0, PRIOR_LOG_SD])
 POLISHING = 4
 """Newton steps after the search, which stops where the likelihood is flat to its eighth digit: its last bits must not matter."""
 WINDOWS_PER_SEGMENT = 16
+SHORTEST_WINDOW, LONGEST_WINDOW = 16, 2048
+"""Samples of a window: from fewer no spectrum can be made, and in more a short ramp's own shape would pass as noise."""
 TREND_DEGREE = 3
 SWAYS = 2.0
 """Variance of a torque beside its trend, in that of its noise, from which on it is taken for real."""
-SHORTEST_WINDOW = 16
-"""Samples of a ramp from which a spectrum can be made."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def _rough_noise(record: ChannelRecord) -> NoiseEstimate:
 def median_periodogram(record: ChannelRecord) -> Spectrum:
     """Median over short windows of a record, each free of its trend."""
     most = longest(record)
-    length = int(np.clip(most // WINDOWS_PER_SEGMENT, min(32, most), 2048))
+    length = int(np.clip(most // WINDOWS_PER_SEGMENT, SHORTEST_WINDOW, LONGEST_WINDOW))
     starts = np.concatenate([np.arange(s.start, s.stop - length + 1, length) for s in record.segments])
     angle, torque = (values[starts.astype(int)[:, None] + np.arange(length)] for values in (record.angle_rad, record.torque_nm))
     basis = np.linalg.qr(np.vander(np.linspace(-1, 1, length), TREND_DEGREE + 1))[0]

@@ -4,6 +4,8 @@ import numpy as np
 
 ENOUGH = 20_000
 """Samples that tell the median to a percent."""
+ON_A_LINE = 1e-4
+"""Distance from a line, in the step from sample to sample, below which a sample is on it."""
 
 
 def white_noise(values: np.ndarray, time_s: np.ndarray | None = None) -> float:
@@ -22,5 +24,6 @@ def white_noise(values: np.ndarray, time_s: np.ndarray | None = None) -> float:
     beside = values[at + 1] - (1.0 - share) * values[at] - share * values[at + 2]
     beside = np.abs(beside) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
     median = float(1.4826 * np.median(beside))
-    # Most samples of a channel that is rounded coarsely are on a line with their neighbours.
-    return median if median > 1e-9 * float(np.ptp(values)) else float(np.sqrt(np.mean(beside**2)))
+    # Most samples of a channel that is rounded coarsely are on a line with their neighbours, but for the rounding of their times.
+    step = float(np.sqrt(np.mean(np.diff(values) ** 2)))
+    return median if median > ON_A_LINE * step else float(np.sqrt(np.mean(beside**2)))

@@ -20,6 +20,7 @@ from backdrive_bayes.commands.main import VERBS, main
 from backdrive_bayes.engine import (
     covariance,
     diagnostics,
+    flanks,
     infer,
     linearise,
     parameters,
@@ -43,6 +44,8 @@ NUMBERS = {
     "read_outs": str(len(reducer.READ_OUTS) - 1),
     "seen": f"{reducer.LEFT_OUT:g}",
     "bearings": str(search.MOST_BEARINGS),
+    "flanks": str(search.MOST_FLANKS),
+    "ratios": str(flanks.RATIOS.size),
     "film": f"{history.FILM:g}",
     "resting": f"{history.RESTING:g}",
     "noncongruent": f"{noncongruent_loops.USUAL:g}",

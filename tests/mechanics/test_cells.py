@@ -16,6 +16,7 @@ CELLS = {
     "elastic": Cells(np.array([0.2]), np.array([0.2]), np.array([0.3]), np.array([2.0])),
     "friction": Cells(np.array([0.15]), np.array([-0.05]), np.array([0.4]), np.array([2.0])),
     "clearance": Cells(np.array([0.1]), np.array([-0.3]), np.array([0.2]), np.array([0.4])),
+    "flank": Cells(np.array([0.3]), np.array([0.15]), np.array([0.2]), np.array([2.0]), np.array([0.1])),
 }
 MANY = join(*CELLS.values())
 RELAYS = 400
@@ -31,27 +32,28 @@ def along(torque, seconds=None, state="neutral"):
     return replace(through(np.arange(len(torque), dtype=float) if seconds is None else seconds, torque, 1.0), state=state)
 
 
-def relays(torque, up, down, width, state):
-    """State of a bundle of relays after every sample, each followed by itself."""
-    share = (np.arange(RELAYS) + 0.5) / RELAYS * width
-    high, low = up + share, down + share
+def relays(torque, up, down, width, fall, state):
+    """Share of a bundle of relays that is up after every sample, each followed by itself."""
+    share = (np.arange(RELAYS) + 0.5) / RELAYS
+    high, low = up + share * width, down + share * fall
     middle = {"upper": low, "lower": high, "neutral": 0.5 * (high + low)}[state]
     on, found = torque[0] > middle, []
     if state == "neutral" and np.isclose(up, -down - width):
         # A clearance rests in its middle: half of its relays are up, but for those that the first torque forces.
-        on = (share < 0.5 * width) & (torque[0] > low) | (torque[0] > high)
+        on = (share < 0.5) & (torque[0] > low) | (torque[0] > high)
     for value in torque[1:]:
         on = (on | (value > high)) & (value > low)
-        found.append(on.mean() * width)
+        found.append(on.mean())
     return np.array(found)
 
 
 def slow(cells, torque, state):
     """The response of odd pairs as sums of relays, (samples - 1, cells)."""
     columns = []
-    for up, down, width, norm in zip(cells.up, cells.down, cells.width, cells.norm, strict=True):
-        pair = relays(torque, up, down, width, state) + relays(torque, -down - width, -up - width, width, state)
-        columns.append((pair - width) / norm)
+    for up, down, width, fall, norm in zip(cells.up, cells.down, cells.width, cells.fall, cells.norm, strict=True):
+        one, other = (up, down, width, fall), (-down - fall, -up - width, fall, width)
+        pair = relays(torque, *one, state) + relays(torque, *other, state)
+        columns.append((pair - 1.0) * width / norm)
     return np.stack(columns, axis=1)
 
 
@@ -172,10 +174,10 @@ def test_nothing_moves_before_the_torque_does():
 
 def test_wider_multiplies_thresholds_and_keeps_what_is_elastic():
     wide = MANY.wider(1.5)
-    np.testing.assert_allclose(wide.threshold, MANY.threshold * np.array([1.0, 1.5, 1.5]))
-    np.testing.assert_allclose(wide.centre[:2], MANY.centre[:2])
+    np.testing.assert_allclose(wide.threshold, MANY.threshold * np.array([1.0, 1.5, 1.5, 1.5]))
+    np.testing.assert_allclose(wide.centre[[0, 1, 3]], MANY.centre[[0, 1, 3]])
     same = MANY.wider(1.0)
-    assert all(np.allclose(getattr(same, n), getattr(MANY, n)) for n in ("up", "down", "width", "norm"))
+    assert all(np.allclose(getattr(same, n), getattr(MANY, n)) for n in ("up", "down", "width", "fall", "norm"))
 
 
 @given(TORQUES, st.floats(0.5, 2.0))

@@ -12,6 +12,7 @@ from backdrive_bayes.mechanics.reducer import (
     THRESHOLDS,
     TOP,
     ReducerClass,
+    flank,
     place_knots,
     plays,
     principal_components,
@@ -164,6 +165,46 @@ def test_a_bearing_that_slips_at_one_torque_is_held_at_every_amplitude_by_its_ow
         return np.abs(truth - columns @ np.linalg.lstsq(columns, truth, rcond=1e-9)[0]).max()
 
     assert left(r) < 1e-6 < 1e-3 < left()
+
+
+def coulomb(torque, ratio):
+    """Load that passes a flank with friction in proportion to it, from rest: it rests between the edges of the friction cone."""
+    load, found = 0.0, []
+    for low, high in (sorted((z, z / ratio)) for z in torque):
+        load = min(max(load, low), high)
+        found.append(load)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.48, 0.9])
+def test_a_flank_with_friction_in_proportion_to_its_load_is_held_at_every_amplitude(ratio):
+    """A play of fixed threshold (planted fault) bends elsewhere in a smaller loop."""
+    history = ramp(0.0, 1.0, -1.0, 1.0, -1.0, 0.4, -0.4, 0.4)
+    cells, _ = flank(ratio)
+    truth = coulomb(history.z1, ratio)
+    np.testing.assert_allclose(2.0 * cells.ends(history).sum(axis=1), truth, atol=1e-12)
+    threshold = Cells(*(np.array([v]) for v in (-TOP, -TOP - (1 - ratio), 2 * TOP, 2.0))).ends(history)
+    fit = threshold @ np.linalg.lstsq(threshold, truth)[0]
+    assert np.abs(fit - truth).max() > 0.05
+
+
+def test_a_flank_that_slips_back_beyond_zero_does_so_in_proportion_to_its_load():
+    """After a smaller load the torque that turns it back is smaller."""
+    cells, ratio = flank(-0.2)[0], -0.2
+    for amplitude in (1.0, 0.5):
+        history = ramp(0.0, amplitude, -1.0)
+        back = history.z1[200:][np.flatnonzero(np.diff(cells.ends(history)[200:].sum(axis=1)) < -1e-4)]
+        released = back[back > ratio * amplitude - 0.03]
+        assert released.size and released.max() < 0.01
+        assert cells.up[0] == 0.0 and np.all(cells.down + cells.fall <= 1e-12)
+
+
+@pytest.mark.parametrize("growth", [0.3, -0.3])
+def test_growth_of_a_flank_along_a_history_is_that_of_all_its_thresholds(growth):
+    cells, history = flank(0.48)[0], ramp(0.0, 1.0, -1.0, 0.4, -0.4, 1.0)
+    along = cells.grown(np.full((2, history.weight.size), growth))
+    np.testing.assert_allclose(along.ends(history), cells.grown(growth).ends(history), atol=1e-12)
+    np.testing.assert_allclose(along.means(history), cells.grown(growth).means(history), atol=1e-12)
 
 
 def test_flanks_that_differ_are_even_in_the_torque():

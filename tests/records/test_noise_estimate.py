@@ -7,6 +7,7 @@ from support.bench import KNOWN_NOISE, unit_of
 from backdrive_bayes.bench.known_truth import BenchNoise
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise, estimate_noise
+from backdrive_bayes.records.white_noise import white_noise
 
 FIELDS = ("white_rad", "correlated_rad", "correlation_time_s", "torque_nm")
 SEEDS = range(5)
@@ -95,6 +96,28 @@ def test_an_angle_that_follows_a_torque_in_stairs_is_no_noise():
         estimate_noise(record.time_s, torque, angle, segments).correlated_rad for torque in (moved, record.torque_nm)
     )
     assert with_torque < 1.5 * KNOWN_NOISE.correlated_rad and without > 2.0 * with_torque
+
+
+@pytest.mark.parametrize("legs", [95, 300])
+def test_a_short_record_with_a_steep_step_shows_its_noise_all_the_same(legs):
+    """Windows of a third of a leg (planted fault, 32 samples) take the loop's own shape for noise."""
+    rng, turns = np.random.default_rng(0), 6
+    torque = np.concatenate([s * np.linspace(-1.0, 1.0, legs)[:-1] for s in (1, -1) * (turns // 2)])
+    rising = np.repeat((1, -1) * (turns // 2), legs - 1)
+    angle = torque + np.tanh((torque - 0.03 * rising) / 0.02) + 0.1 * torque**3
+    sd = 1e-3
+    time = np.arange(torque.size) * 0.1
+    read, turned = torque + 1e-4 * rng.standard_normal(time.size), angle + sd * rng.standard_normal(time.size)
+    found = estimate_noise(time, read, turned, find_segments(time, read))
+    assert 0.8 * sd < np.hypot(found.white_rad, found.correlated_rad) < 1.6 * sd
+
+
+def test_a_coarsely_rounded_channel_has_noise_though_its_times_are_rounded_too():
+    """Most samples lie on the line through their neighbours, but for the last digit of their times."""
+    rng = np.random.default_rng(0)
+    time = np.round(np.arange(4000) * 0.0137 + 1e-7 * rng.standard_normal(4000), 6)
+    values = np.round((0.01 * time + 1e-4 * rng.standard_normal(time.size)) / 4e-3) * 4e-3
+    assert white_noise(values, time) > 1e-4
 
 
 def _stairs(samples, step=50):
