@@ -11,7 +11,7 @@ and one CSV file per record) and ``OUT/key.json`` (the truth). The same seed giv
 
 Severity: ``rms`` in the key is the rms, over all samples of a unit, of the change of the noise-free angle that remains after
 a scale and an offset were refitted in each record, divided by the standard deviation of the angle noise. An effect of size
-``s`` has rms ``LEVEL * s``. Traces of channel effects are given as plain rms, without any refit.
+``s`` has rms ``LEVEL * s`` (option ``--level``). Traces of channel effects are given as plain rms, without any refit.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 LEVEL = 3.0  # rms of an effect of size 1, in standard deviations of the angle noise
 TRACE_NAMES = ("torque_offset", "sensor_lag", "thermal_drift", "encoder_error")
@@ -57,17 +58,18 @@ def rub(u, f, r0, mu, pre):
 
 
 @njit
-def rub_stick(u, f, time, draw, r0, mu, pre, excess, over, age):
+def rub_stick(u, f, time, draw, r0, mu, pre, excess, over, age, loaded):
     """As rub, with static above kinetic friction: a stuck node breaks away late and lands beyond kinetic balance.
 
     excess: break-away above the mean friction; over: how far it lands below; age: time constant of the growth of the
-    static friction at rest (0: none); draw: random factors, one per event (ones: none).
+    static friction at rest (0: none); draw: random factors, one per event (ones: none); loaded: 1 where the excess grows
+    with the load, else 0.
     """
     out = np.empty(u.size)
     t, since, event = 0.0, time[0], 0
     for i in range(u.size):
         m = min(mu * f[i], 0.95)
-        grown = excess * draw[event % draw.size]
+        grown = excess * draw[event % draw.size] * (1.0 + 3.0 * loaded * abs(t))
         if age > 0.0:
             grown *= 1.0 - math.exp(-(time[i] - since) / age)
         low = _up(u[i], r0 * f[i] + grown, m, pre)
@@ -560,7 +562,8 @@ def chain_angle(chain, u, path, effects, moving):
         kind = e[0]
         if kind == "rub":
             if i == stuck:
-                u = rub_stick(u, f, t, stick["draw"], e[1], e[2], e[3], stick["s"], stick["over"], stick["age"])
+                u = rub_stick(u, f, t, stick["draw"], e[1], e[2], e[3], stick["s"], stick["over"], stick["age"],
+                              float(stick["variant"] == "mesh"))
             else:
                 u = rub(u, f, e[1], e[2], e[3])
         elif kind == "lin":
@@ -758,13 +761,13 @@ def sample_times(kind, end, n, rng):
     return np.unique(base)
 
 
-def make_record(index, style, amplitude, leg, clock, start, sampling, rng, shape, n):
+def make_record(index, style, amplitude, leg, clock, start, sampling, rng, shape, n, steps):
     """One record: its path on the fine grid, its sample times and what the key says about it."""
     cycles = int(rng.choice([1, 2, 3], p=[0.5, 0.3, 0.2]))
     tk, uk = make_path(style, amplitude, leg, cycles, start, int(rng.choice([-1, 1])), rng, shape)
     end = float(tk[-1])
     ts = sample_times(sampling, end, n, rng)
-    t = np.unique(np.concatenate([tk, ts, np.linspace(tk[0], end, 5000)]))
+    t = np.unique(np.concatenate([tk, ts, np.linspace(tk[0], end, steps)]))
     u = np.interp(t, tk, uk)
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(u)))])
     rate = float(np.sum(np.abs(np.diff(uk))) / (tk[-1] - tk[0]))
@@ -777,8 +780,11 @@ def make_record(index, style, amplitude, leg, clock, start, sampling, rng, shape
             "start": start, "style": style}
 
 
-def make_records(rng, style):
-    """Records of a unit: two to four, at different rates and in half of the units at different amplitudes."""
+def make_records(rng, style, fine):
+    """Records of a unit: two to four, at different rates and in half of the units at different amplitudes.
+
+    fine: sample and step finely enough to resolve single jumps.
+    """
     n = int(rng.integers(2, 5))
     slow = log_uniform(rng, 15.0, 300.0)
     ratio = log_uniform(rng, 1.5, 3.0) if rng.uniform() < 0.12 else log_uniform(rng, 3.0, 30.0)
@@ -792,11 +798,12 @@ def make_records(rng, style):
     shape = {"steps": rng.uniform(4, 10), "ramp": rng.uniform(0.2, 0.6), "hold": rng.uniform(0.15, 0.8),
              "back": rng.uniform() < 0.6}
     start = str(rng.choice(["rest", "tip", "cycled"], p=[0.55, 0.25, 0.2]))
-    samples = log_uniform(rng, 600.0, 16000.0)
+    samples = log_uniform(rng, 5000.0 if fine else 600.0, 16000.0)
     records, clock = [], 0.0
     for i in range(n):
         count = int(np.clip(samples * rng.uniform(0.8, 1.25), 500, 20000))
-        rec = make_record(i, style, float(amplitude[i]), float(legs[i]), clock, start, sampling, rng, shape, count)
+        rec = make_record(i, style, float(amplitude[i]), float(legs[i]), clock, start, sampling, rng, shape, count,
+                          60000 if fine else 5000)
         clock += rec["path"]["end"] * 1.02 + 5.0
         records.append(rec)
     return records, sampling, clock
@@ -865,7 +872,7 @@ def draw_effect(name, variant, rng, records, total):
     elif name == "stick_slip":
         e["over"] = float(rng.uniform(0.3, 1.0))
         e["age"] = 0.3 * min(legs) if variant == "ageing" else 0.0
-        e["draw"] = rng.uniform(0.4, 1.6, 64) if variant == "random_static" else np.ones(1)
+        e["draw"] = rng.exponential(1.0, 97) ** 1.5 if variant == "random_static" else np.ones(1)
     elif name == "rate_dependent_friction":
         e["rate0"] = float(np.exp(np.mean([np.log(r["path"]["rate"]) for r in records])))
         if variant in ("stribeck", "viscous"):
@@ -873,7 +880,9 @@ def draw_effect(name, variant, rng, records, total):
     elif name == "x_load_ripple":
         e["period"], e["phase"] = 1.0 / log_uniform(rng, 5.0, 16.0), float(rng.uniform(0.0, 2.0 * np.pi))
     elif name == "x_pump_pulsation":
-        e["period"], e["phase"] = min(legs) / float(rng.uniform(2.5, 12.0)), float(rng.uniform(0.0, 2.0 * np.pi))
+        seen = 8.0 * max(r["path"]["end"] / r["ts"].size for r in records)
+        e["period"] = max(min(legs) / float(rng.uniform(1.0, 8.0)), seen)
+        e["phase"] = float(rng.uniform(0.0, 2.0 * np.pi))
     elif name in ("x_fixture_jump", "x_sudden_crack"):
         rec = records[int(rng.integers(len(records)))]
         e["at"] = (rec["path"]["clock"] + float(rng.uniform(0.3, 0.7)) * rec["path"]["end"]) / total
@@ -937,6 +946,14 @@ def scale_effect(unit, e, target, refit=True, tolerance=0.03):
     return None
 
 
+def resolved(unit, e):
+    """Whether the records sample the jumps of stick-slip at least four times each on average; True for other effects."""
+    if e["name"] != "stick_slip":
+        return True
+    travel = sum(float(r["path"]["travel"][-1]) for r in unit["records"])
+    return 4.0 * travel / (e["s"] * (1.0 + e["over"]) * float(np.mean(e["draw"]))) < sum(r["ts"].size for r in unit["records"])
+
+
 # ---------------------------------------------------------------------------------------------------------------------
 # Units.
 
@@ -970,14 +987,14 @@ def indicators(unit, amplitude):
             "dissipation_ratio": area / absorbed, "peak_rad": float(0.5 * (plus[-1] - plus[0]))}
 
 
-def draw_unit(name, style, rng):
-    """A reducer with its protocol, its clean angles and its noise."""
+def draw_unit(name, style, rng, fine=False):
+    """A reducer with its protocol, its clean angles and its noise; fine as in make_records."""
     unit = build_reducer(name, rng)
-    unit["records"], unit["sampling"], unit["total"] = make_records(rng, style)
+    unit["records"], unit["sampling"], unit["total"] = make_records(rng, style, fine)
     unit["style"] = style
     _, x = settled_loop(unit["chain"], 1.0)
     unit["span"] = float(x.max() - x.min())
-    unit["snr"] = log_uniform(rng, 200.0, 3000.0)
+    unit["snr"] = log_uniform(rng, 200.0, 600.0 if fine else 3000.0)
     unit["noise"] = 0.5 * unit["span"] / unit["snr"]
     for rec in unit["records"]:
         rec["path"]["zero"] = float(rng.uniform(0.0, 1.0)) * unit["span"]
@@ -987,8 +1004,6 @@ def draw_unit(name, style, rng):
 
 def ornstein_uhlenbeck(n, steps, rng):
     """Stationary correlated noise of unit variance with a correlation time in samples."""
-    from scipy.signal import lfilter
-
     a = math.exp(-1.0 / steps)
     start = rng.normal()
     w = rng.normal(size=n) * math.sqrt(1.0 - a * a)
@@ -1038,7 +1053,8 @@ def write_unit(unit, effects, folder, rng):
         file = f"rec-{rec['index'] + 1}.csv"
         with open(folder / file, "w", encoding="ascii", newline="\n") as f:
             f.write("time_s,torque_Nm,angle_arcmin\n")
-            np.savetxt(f, np.column_stack([rec["ts"], torque, angle / ARCMIN])[keep], fmt="%.9g", delimiter=",")
+            table = np.column_stack([rec["ts"], torque, angle / ARCMIN])[keep]
+            np.savetxt(f, table, fmt=["%.12g", "%.9g", "%.9g"], delimiter=",")
         rate = rec["path"]["rate"] * rated
         amplitude = rec["amplitude"] * rated
         lines += ["", "[[record]]", f'file = "{file}"', f"loading_rate_Nm_per_s = {rate:.6g}", f"amplitude_Nm = {amplitude:.6g}"]
@@ -1069,7 +1085,7 @@ def plan(units, rng):
     odd = list(rng.permutation(UNLISTED))
     for i in range(strange):
         name = str(odd[i % len(odd)])
-        jobs.append(("unlisted", [(name, pick(name), (1.0, 0.4)[(i + i // len(odd)) % 2])]))
+        jobs.append(("unlisted", [(name, pick(name), (1.0, 0.4)[i % 2])]))
     ring = [str(n) for n in rng.permutation(LISTED)]
     for i in range(pairs):
         both = sorted([ring[i % len(ring)], ring[(i + 1 + i // len(ring)) % len(ring)]])
@@ -1085,19 +1101,20 @@ def plain(value):
     return value
 
 
-def make_unit(job, family, style, seed, index, folder):
+def make_unit(job, family, style, seed, index, folder, level):
     """Draws a unit until its effects reach their sizes, writes it, and returns its entry of the key."""
     kind, wanted = job
+    fine = any(name == "stick_slip" for name, _, _ in wanted)
     for attempt in range(1, 61):
         rng = np.random.default_rng([seed, index, attempt])
         if attempt > 5:
             family = str(rng.choice(list(FAMILIES)))
-        unit = draw_unit(family, style, rng)
+        unit = draw_unit(family, style, rng, fine)
         effects, rms = [], {}
         for name, variant, size in wanted:
             e = draw_effect(name, variant, rng, unit["records"], unit["total"])
-            got = scale_effect(unit, e, LEVEL * size)
-            if got is None:
+            got = scale_effect(unit, e, level * size)
+            if got is None or not resolved(unit, e):
                 break
             e["size"] = size
             effects.append(e)
@@ -1136,6 +1153,7 @@ def main():
     parser.add_argument("out", type=Path)
     parser.add_argument("--units", type=int, default=80)
     parser.add_argument("--seed", type=int, default=91)
+    parser.add_argument("--level", type=float, default=LEVEL, help="rms of an effect of size 1, in noise deviations")
     args = parser.parse_args()
     rng = np.random.default_rng([args.seed, 0])
     jobs = plan(args.units, rng)
@@ -1148,7 +1166,7 @@ def main():
         family = deck[group][turn[group] % len(FAMILIES)]
         turn[group] += 1
         case = f"case-{i + 1:02d}"
-        key[case] = make_unit(job, family, str(styles[i]), args.seed, i + 1, args.out / case)
+        key[case] = make_unit(job, family, str(styles[i]), args.seed, i + 1, args.out / case, args.level)
     (args.out / "key.json").write_text(json.dumps(key, indent=1) + "\n", encoding="ascii")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,15 +48,15 @@ WIDE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The search for a mode beside ``fixed`` columns, from a class with flanks of these ``ratios``; of what bends the prediction
-    ``only`` these may act, all by default."""
+    """The search for a mode beside ``fixed`` columns, of a class with flanks of these ``ratios``, sought if none are given;
+    of what bends the prediction ``only`` these may act, all by default."""
 
     reduced: Reduced
     effects: tuple[Effect, ...]
     modules: tuple[str, ...]
     fixed: tuple[Group, ...]
     only: tuple[str, ...] | None = None
-    ratios: np.ndarray = field(default_factory=lambda: np.empty(0))
+    ratios: np.ndarray | None = None
 
     @classmethod
     def over(cls, reduced: Reduced, effects: tuple[Effect, ...], modules: tuple[str, ...]) -> Search:
@@ -69,9 +69,9 @@ class Search:
         jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
         learnings = LEARNINGS if refine else 0
         covariances = reduced.covariances(reduced.read_slopes, jitter)
-        laid, weights, refined, seeking = None, None, 0, "friction" in self.modules
+        laid, weights, refined, seeking = None, None, 0, self.ratios is None and "friction" in self.modules
         known: dict[str, float] = {}
-        ratios = self.ratios
+        ratios = np.empty(0) if self.ratios is None else self.ratios
         idle: set[str] = set()
         for step in range(steps):
             if laid is None or (not refined and _far(laid, distortion, context)):
@@ -94,7 +94,8 @@ class Search:
                 seeking = ratios.size > reducer.ratios.size
                 finer = replace(reducer, ratios=ratios)
             elif refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
-                finer, refined = _refined(linear), refined + 1
+                finer = _refined(linear)
+                refined += int(finer.richness > reducer.richness)
             if finer.richness > reducer.richness:
                 reducer, weights = finer, None
                 distortion = _towards(distortion, moved, context)

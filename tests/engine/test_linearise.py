@@ -134,7 +134,8 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     worst[0][first] = 9.0
     monkeypatch.setattr(search, "MOST_KNOTS", clean.reducer.knots.size + 20)
     monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
-    found, bearings = search._refined(clean)
+    refined = search._refined(clean)
+    found, bearings = refined.knots, refined.bearings
     low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
     assert clean.reducer.knots.size < found.size <= search.MOST_KNOTS
     new = np.setdiff1d(found, clean.reducer.knots)
@@ -226,11 +227,13 @@ def test_friction_that_follows_the_rate_at_the_moment_is_found_in_records_of_one
 def test_a_law_of_the_rate_is_told_from_one_of_the_amplitude_by_two_rates_of_one_amplitude():
     """Where the small loop is the fast one, friction may follow either (planted fault)."""
 
-    def factor(*loops):
-        unit = planted(known=_rough_reducer(4.0), exponent=0.4, loops=loops)
+    def factor(*loops, seed=0):
+        unit = planted(seed, known=_rough_reducer(4.0), exponent=0.4, loops=loops)
         return weigh(linearise(reduce_unit(unit), library_terms())).log_factor[(LAW,)]
 
-    assert factor((0.1, 0.02), (0.05, 0.1)) < 1.0 and factor((0.1, 0.02), (0.1, 0.1), (0.05, 0.1)) > 30.0
+    confounded = [factor((0.1, 0.02), (0.05, 0.1), seed=seed) for seed in range(3)]
+    assert np.median(confounded) < 1.0 and max(confounded) < 10.0
+    assert factor((0.1, 0.02), (0.1, 0.1), (0.05, 0.1)) > 30.0
 
 
 def _rough_reducer(times):
