@@ -1,52 +1,52 @@
-"""Flanks with friction in proportion to their load: at which shares of a torque they slip back is searched."""
+"""Flanks with friction in proportion to their load: the ratios of their switching torques are selected by marginal likelihood."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from backdrive_bayes.engine.design import Design, Group, grown_histories
 from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.marginal import Known, Moments
 from backdrive_bayes.mechanics.reducer import flank
 
 RATIOS = np.arange(-0.9, 0.98, 0.06)
-"""Ratios that are tried first; about the best of them closer ones, at halves of the distance, HALVINGS times."""
-HALVINGS = 3
+"""Ratios of the first grid: from flanks that release only beyond zero torque to flanks with next to no friction. A flank between
+two of them raises the marginal likelihood of both."""
+REFINEMENTS = 3
+"""How often the grid is halved about the best ratio, to a distance below one hundredth."""
 PRICE = float(np.log(RATIOS.size))
-"""What it costs to choose one of them."""
+"""Log prior odds against one ratio among those of the grid."""
 
 
-def with_flank(linear: Linear) -> np.ndarray:
-    """Ratios of a class at which flanks slip back, with one more if that has the higher marginal likelihood, other things as they
-    are."""
+def select_flank(linear: Linear) -> np.ndarray:
+    """Ratios of the flanks of a class, (flanks,): those that it has, and one more where its log marginal likelihood is higher by
+    more than PRICE, other scales and the distortion as they are."""
     known, near, step = linear.reducer.ratios, RATIOS, float(np.diff(RATIOS)[0])
     tried: dict[float, float] = {}
-    for _ in range(HALVINGS + 1):
+    for _ in range(REFINEMENTS + 1):
         new = [float(r) for r in near if r not in tried and np.abs(np.r_[known, -2.0] - r).min() > 0.5 * step]
-        tried |= dict(zip(new, _gains(linear, new), strict=True))
+        tried |= dict(zip(new, _gains(linear, new) if new else (), strict=True))
         best, step = max(tried, key=tried.__getitem__), 0.5 * step
         near = np.array([best - step, best + step])
     return np.sort(np.r_[known, best]) if tried[best] > PRICE else known
 
 
-def _gains(linear: Linear, ratios) -> list[float]:
+def _gains(linear: Linear, ratios: list[float]) -> list[float]:
     """Gains in the log marginal likelihood by one flank of each ratio."""
     data, scale = linear.data, np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index]
     grown = grown_histories(linear.reduced, linear.distortion)
-    groups = [
+    groups = tuple(
         Group("friction", tuple(cells.grown(growth[0]).means(history) @ mixing for history, growth in grown))
         for cells, mixing in map(flank, ratios)
-    ]
-    if not groups:
-        return []
-    more = linear.whitened(Design(tuple(groups))).x * np.exp(linear.log_scale["friction"])
-    lower, seen, chi2 = data.moments.factor(scale)
-    across = solve_triangular(lower, scale[:, None] * (data.x.T @ more), lower=True, check_finite=False)
-    found, ends = [], np.cumsum([0, *(g.width for g in groups)])
-    for begin, end in zip(ends[:-1], ends[1:], strict=True):
-        own, shared = more[:, begin:end], across[:, begin:end]
-        root = np.linalg.cholesky(np.eye(end - begin) + own.T @ own - shared.T @ shared)
-        less = solve_triangular(root, own.T @ data.y - shared.T @ seen, lower=True)
-        fall = np.log1p(chi2 / data.noise_dof) - np.log1p(max(chi2 - float(less @ less), 0.0) / data.noise_dof)
-        found.append(0.5 * data.moments.dof * float(fall) - float(np.log(np.diag(root)).sum()))
-    return found
+    )
+    rows = np.column_stack([data.x, linear.whitened(Design(groups)).x, data.y])
+    joined = Moments(rows.T @ rows, data.samples, data.noise_dof)
+    left = Known.of(joined, np.arange(rows.shape[1] - 1) < scale.size, scale).left
+
+    def log_marginal(columns) -> float:
+        own = np.r_[columns, left.inner.shape[0] - 1].astype(int)
+        usual = np.full(own.size - 1, np.exp(linear.log_scale["friction"]))
+        return float(Moments(left.inner[np.ix_(own, own)], data.samples, data.noise_dof).log_marginal(usual))
+
+    columns = np.split(np.arange(left.inner.shape[0] - 1), np.cumsum([g.width for g in groups])[:-1])
+    return [log_marginal(own) - log_marginal([]) for own in columns]

@@ -36,7 +36,7 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
     if others:
         begin = max(others, key=lambda start: free.run(start, TRIAL_STEPS).log_marginal) if len(others) > 1 else others[0]
         joint = max(joint, free.run(begin, STEPS, refine=True), key=lambda ended: ended.log_marginal)
-    # All modes and all that is compared are of one class.
+    # Marginal likelihoods of modes are compared: all are of one class.
     free = replace(free, ratios=joint.reducer.ratios)
     waves: tuple[Group, ...] = ()
     wandering, gain = learn_wander(joint)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backdrive_bayes.engine.design import Group, class_groups, class_priors, histories, path_group, tangent_groups
-from backdrive_bayes.engine.flanks import with_flank
+from backdrive_bayes.engine.flanks import select_flank
 from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import find_scales, whiten
@@ -24,7 +24,8 @@ KNOTS, MOST_KNOTS = 60, 140
 MOST_BEARINGS, CLOSEST = 5, 0.008
 """Bearings with thresholds of their own at most, and the least distance of these."""
 FIRST_FLANK, MOST_FLANKS = 2, 3
-"""Step from which flanks are sought, before the jitter could stand for them, and how many at most."""
+"""Step from which on flanks are selected, before the jitter is learnt, which would absorb their residual, and the largest number
+of them: each adds some 25 weights."""
 LEAST_APART = 0.3
 """Least distance of knots in the torque noise of a sample."""
 CONSPICUOUS = 3.5
@@ -48,8 +49,11 @@ WIDE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The search for a mode beside ``fixed`` columns, of a class with flanks of these ``ratios``, sought if none are given;
-    of what bends the prediction ``only`` these may act, all by default."""
+    """The search for a mode beside ``fixed`` columns.
+
+    ``ratios`` (flanks,) are those of the class; None selects them by marginal likelihood. Of what bends the prediction ``only``
+    these may act, all by default.
+    """
 
     reduced: Reduced
     effects: tuple[Effect, ...]
@@ -69,7 +73,7 @@ class Search:
         jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
         learnings = LEARNINGS if refine else 0
         covariances = reduced.covariances(reduced.read_slopes, jitter)
-        laid, weights, refined, seeking = None, None, 0, self.ratios is None and "friction" in self.modules
+        laid, weights, refined, selecting = None, None, 0, self.ratios is None and "friction" in self.modules
         known: dict[str, float] = {}
         ratios = np.empty(0) if self.ratios is None else self.ratios
         idle: set[str] = set()
@@ -89,9 +93,9 @@ class Search:
                 learnings, jitter = learnings - 1 if found != jitter else 0, found
             covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
             finer = reducer
-            if refine and step >= FIRST_FLANK and seeking and ratios.size < MOST_FLANKS:
-                ratios = with_flank(linear)
-                seeking = ratios.size > reducer.ratios.size
+            if refine and step >= FIRST_FLANK and selecting and ratios.size < MOST_FLANKS:
+                ratios = select_flank(linear)
+                selecting = ratios.size > reducer.ratios.size
                 finer = replace(reducer, ratios=ratios)
             elif refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
                 finer = _refined(linear)

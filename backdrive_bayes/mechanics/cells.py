@@ -41,7 +41,7 @@ class Cells:
     growth: np.ndarray | None = None
 
     def __post_init__(self):
-        if self.fall.size != self.width.size:
+        if self.fall.size == 0:
             object.__setattr__(self, "fall", self.width)
 
     @property

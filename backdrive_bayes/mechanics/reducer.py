@@ -41,9 +41,11 @@ LEFT_OUT = 3e-4
 """Share of the prior standard deviation of that path's angle which principal components that are left out have together."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
 FLANK_SHARE, FLANK_ALIKE = 0.1, 0.3
-"""Usual compliance of a flank in that of all friction, and the correlation's length of it over the root of the load."""
+"""Prior standard deviation of a flank's compliance over that of all friction, and its correlation length over the root of the
+load. Both are guesses beside the scale of friction, which is learnt."""
 FLANK_NODES = np.r_[np.linspace(0.0, 1.0, 26)[:-1] ** 1.5, TOP]
-"""Torques between which the compliance of a flank is even."""
+"""Torques between which the compliance of a flank is constant. A flank that releases beyond zero torque does so in the order in
+which it slipped, relays of a cell in the opposite one: the cells are narrow, most of all at small loads."""
 GROWING = ("friction", "clearance")
 """Parts whose thresholds follow the rate and the amplitude."""
 GROWTH_STEP = 2e-3

@@ -131,29 +131,28 @@ def surged_sum(share, z0, z1, f0, f1, up, down, width, fall, first, threshold, m
     return total
 
 
+@numba.njit(cache=True, inline="always")
+def _edges(z, factor, edges, r, more, follows):
+    """Distances of a torque from the first upper and lower switching torques of a cell, and the widths of both, at a factor."""
+    a, b, u, d = edges
+    if follows:
+        return z - a * factor, z - b * factor, u * factor, d * factor
+    g = factor - 1.0
+    return z - r * g - a, z + r * g - b, max(u + more * g, LEAST_WIDTH * u), max(d - more * g, LEAST_WIDTH * d)
+
+
 @numba.njit(cache=True, nogil=True)
 def _surge(out, x, z0, z1, f0, f1, edges, r, more, follows, ends):
     """States (segments,) of one cell: the upper torque of a play rises, and its lower one falls, by what its threshold gains,
     which is ``r`` at its first relay and ``more`` than that at its last; a clearance that ``follows`` feels the torque divided by
     the factor."""
-    a, b, u, d = edges
     for i in range(z0.size):
+        p1, q1, u1, d1 = _edges(z1[i], f1[i], edges, r, more, follows)
         # Most cells rest on most segments: that takes no division.
-        if follows:
-            p1, q1, u1, d1 = z1[i] - a * f1[i], z1[i] - b * f1[i], u * f1[i], d * f1[i]
-        else:
-            g1 = f1[i] - 1.0
-            p1, q1 = z1[i] - r * g1 - a, z1[i] + r * g1 - b
-            u1, d1 = max(u + more * g1, LEAST_WIDTH * u), max(d - more * g1, LEAST_WIDTH * d)
         if i > 0 and (x >= 1.0 or p1 <= x * u1) and (x <= 0.0 or q1 >= x * d1):
             out[i] = x
             continue
-        if follows:
-            p0, q0, u0, d0 = z0[i] - a * f0[i], z0[i] - b * f0[i], u * f0[i], d * f0[i]
-        else:
-            g0 = f0[i] - 1.0
-            p0, q0 = z0[i] - r * g0 - a, z0[i] + r * g0 - b
-            u0, d0 = max(u + more * g0, LEAST_WIDTH * u), max(d - more * g0, LEAST_WIDTH * d)
+        p0, q0, u0, d0 = _edges(z0[i], f0[i], edges, r, more, follows)
         p0, p1, q0, q1 = p0 / u0, p1 / u1, q0 / d0, q1 / d1
         if i == 0:
             x = min(max(x, min(p0, 1.0)), max(q0, 0.0))
