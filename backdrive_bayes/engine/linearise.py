@@ -12,7 +12,7 @@ from backdrive_bayes.engine.design import Group, grown_histories
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group, rises
 from backdrive_bayes.engine.reduced import Reduced
-from backdrive_bayes.engine.search import BENDING, LAW, LEAST_APART, STEPS, Search, length
+from backdrive_bayes.engine.search import BENDING, LAW, LEAST_APART, Search, length
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect
@@ -25,28 +25,27 @@ BENT = 2.0
 """Torque, in its noise, by which a distortion moves the prediction no longer along a straight line."""
 
 
-def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tuple[Group, ...]]:
-    """The mode of a search where every effect may act, and the encoder's wave if it has one.
+def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tuple[Group, ...], float]:
+    """The mode of a search where every effect may act, and the encoder's wave with its frequency if it has one.
 
-    It is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside
-    the clearest wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
+    Class, jitter and noise are learnt from the best start; it is the higher of the ends of searches from there and from an
+    undistorted bench, and beside the clearest wave of what is left there, if that is higher still, each with the wander of the
+    reading that it leaves.
     """
-    joint = free.run(Distortion(), STEPS, refine=True)
-    others = _apart([Distortion(), *starts], free.reduced.context)[1:]
-    if others:
-        begin = max(others, key=lambda start: free.run(start, TRIAL_STEPS).log_marginal) if len(others) > 1 else others[0]
-        joint = max(joint, free.run(begin, STEPS, refine=True), key=lambda ended: ended.log_marginal)
-    # Marginal likelihoods of modes are compared: all are of one class.
-    free = replace(free, ratios=joint.reducer.ratios)
+    starts = _apart([Distortion(), *starts], free.reduced.context)
+    begin = max(starts, key=lambda start: free.learn(start, TRIAL_STEPS).log_marginal) if len(starts) > 1 else starts[0]
+    like = free.learn(begin)
+    ends = [free.settle(like, at) for at in (like.distortion, *({Distortion(), begin} - {begin}))]
+    joint = max(ends, key=lambda ended: ended.log_marginal)
     waves: tuple[Group, ...] = ()
     wandering, gain = learn_wander(joint)
     clear, frequency = clearest_wave(joint)
     if clear > 0:
         wave = periodic_group(joint, frequency)
-        waved = replace(free, fixed=(*free.fixed, wave)).run(joint.distortion, STEPS, refine=True)
+        waved = replace(free, fixed=(*free.fixed, wave)).settle(joint, joint.distortion)
         # Of a large wave, what the encoder reads is not the angle at which it errs.
         turned = periodic_group(waved, frequency)
-        nearer = replace(free, fixed=(*free.fixed, turned)).run(waved.distortion, STEPS, refine=True, jitter=waved.jitter)
+        nearer = replace(free, fixed=(*free.fixed, turned)).settle(waved, waved.distortion)
         if nearer.log_marginal > waved.log_marginal:
             wave, waved = turned, nearer
         beside, more = learn_wander(waved)
@@ -54,8 +53,8 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
             joint, waves, wandering, gain = waved, (wave,), beside, more
     if gain > 0:
         again = replace(free, reduced=wandering, fixed=(*free.fixed, *waves))
-        joint = again.run(joint.distortion, STEPS, refine=True, jitter=joint.jitter)
-    return joint, waves
+        joint = again.settle(joint, joint.distortion)
+    return joint, waves, frequency
 
 
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
@@ -66,7 +65,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     where it is likeliest.
     """
     free, starts = Search.over(reduced, effects, modules), possible_starts(reduced)
-    joint, waves = joint_mode(free, starts)
+    joint, waves, frequency = joint_mode(free, starts)
     context = joint.reduced.context
     late = max(start.lag_s for start in starts)
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
@@ -77,8 +76,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
 
     def mode(some: tuple[str, ...]) -> Linear:
         fixed = (*free.fixed, *(waves if WAVE in some else ()))
-        own = replace(free, reduced=joint.reduced, fixed=fixed, only=some, ratios=joint.reducer.ratios)
-        return own.run(_only(reach if LAW in some else lawless, some), STEPS, refine=True, jitter=joint.jitter)
+        own = replace(free, reduced=joint.reduced, fixed=fixed, only=some)
+        return own.settle(joint, _only(reach if LAW in some else lawless, some))
 
     apart: dict[tuple[str, ...], Linear] = {}
     if LAW not in bent and any(term.name in joint.design.names for term in all_effects()[LAW]):
@@ -92,7 +91,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
     found = [linear for some, linear in apart.items() if set(some) <= set(bent)]
-    return tuple(linear.without(WAVE) for linear in (joint, *found))
+    possible = [linear for linear in found if WAVE not in linear.design.names or rises(linear, frequency)]
+    return tuple(linear.without(WAVE) for linear in (joint, *possible))
 
 
 def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:

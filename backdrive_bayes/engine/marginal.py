@@ -6,9 +6,10 @@ degrees of freedom, a flat offset for each record. X and y are whitened by C and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numba
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.linalg.lapack import dpotri, dtrtri
@@ -54,6 +55,14 @@ class Moments:
     def coarsened(self, power: float) -> Moments:
         """The same with the likelihood raised to a power, as if there were fewer independent samples of the same noise."""
         return Moments(self.inner * power, self.samples * power, self.noise_dof)
+
+    def given(self, values, held) -> Moments:
+        """Moments of the other weights where those ``held`` (weights,) have ``values`` (weights,)."""
+        rest, turned = np.r_[~held, True], np.r_[np.where(held, -values, 0.0), 1.0]
+        inner, seen = self.inner[np.ix_(rest, rest)], self.inner @ turned
+        inner[-1] = inner[:, -1] = seen[rest]
+        inner[-1, -1] = turned @ seen
+        return replace(self, inner=inner)
 
     def log_marginal(self, scale) -> np.ndarray:
         """Log marginal likelihoods (...) for standard deviations ``scale`` (..., weights), up to a constant."""
@@ -222,18 +231,29 @@ def _slopes(moments: Moments, scale, first) -> tuple[np.ndarray, np.ndarray]:
     inverse = dpotri(lower, lower=1, overwrite_c=1)[0]  # its lower half, the other is zero
     own = np.diag(inverse)
 
-    def by_scales(matrix):
-        """Sums over the blocks of a symmetric matrix of which the lower half is given."""
-        half = np.add.reduceat(np.add.reduceat(matrix, first, axis=0), first, axis=1)
-        return half + half.T - np.diag(np.add.reduceat(np.diag(matrix), first))
-
     share = moments.dof / (moments.noise_dof + chi2)
     squares, left = np.add.reduceat(mean**2, first), np.add.reduceat(own, first)
     count = np.diff(first, append=scale.size)
-    bent = 4.0 * by_scales(inverse * mean * mean[:, None]) - 2.0 * np.diag(squares)
+    turned, square = _by_scales(inverse, mean, np.repeat(np.arange(first.size), count))
+    bent = 4.0 * turned - 2.0 * np.diag(squares)
     hessian = share * bent + 2.0 * share**2 / moments.dof * np.outer(squares, squares)
-    hessian -= 2.0 * (np.diag(left) - by_scales(inverse**2))
+    hessian -= 2.0 * (np.diag(left) - square)
     return share * squares - (count - left), -hessian
+
+
+@numba.njit(cache=True)
+def _by_scales(inverse, mean, scale):
+    """Sums of M_ij m_i m_j and of M_ij^2 over the weights of two scales, both (scales, scales), of a symmetric M whose lower half is
+    given."""
+    turned, square = np.zeros((scale[-1] + 1, scale[-1] + 1)), np.zeros((scale[-1] + 1, scale[-1] + 1))
+    for j in range(mean.size):
+        for i in range(j, mean.size):
+            value = inverse[i, j]
+            turned[scale[i], scale[j]] += value * mean[i] * mean[j]
+            square[scale[i], scale[j]] += value * value
+        turned[scale[j], scale[j]] -= 0.5 * inverse[j, j] * mean[j] ** 2
+        square[scale[j], scale[j]] -= 0.5 * inverse[j, j] ** 2
+    return turned + turned.T, square + square.T
 
 
 def whiten(columns, angles, covariances, noise_dof: float, settled=None) -> Whitened:

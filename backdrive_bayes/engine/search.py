@@ -34,8 +34,10 @@ REFINEMENTS = 3
 LEARNINGS = 4
 """How often the jitter is learnt at most: a prediction made with too little of it hides most of it."""
 STEPS = 14
-LONGEST_STEP = 2e-3
-"""Longest step of a distortion, in shares of the torque; exponents fifty times as much."""
+LONGEST_STEP, STILL = 2e-3, 1e-4
+"""Longest step of a distortion, in shares of the torque, exponents fifty times as much, and one so short that the search ends."""
+SHORTER = 0.25
+"""Share to which a step that does not rise is shortened."""
 LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"
 BENDING = {
     "torque_offset": ("offset",),
@@ -51,8 +53,7 @@ WIDE = 2.0
 class Search:
     """The search for a mode beside ``fixed`` columns.
 
-    ``ratios`` (flanks,) are those of the class; None selects them by marginal likelihood. Of what bends the prediction ``only``
-    these may act, all by default.
+    Of what bends the prediction ``only`` these may act, all by default.
     """
 
     reduced: Reduced
@@ -60,54 +61,87 @@ class Search:
     modules: tuple[str, ...]
     fixed: tuple[Group, ...]
     only: tuple[str, ...] | None = None
-    ratios: np.ndarray | None = None
 
     @classmethod
     def over(cls, reduced: Reduced, effects: tuple[Effect, ...], modules: tuple[str, ...]) -> Search:
         """The search where every effect may act; what follows from the torque history is made once."""
         return cls(reduced, effects, modules, tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)))
 
-    def run(self, distortion: Distortion, steps: int, refine: bool = False, jitter: Jitter | None = None) -> Linear:
-        """The linear model where the search ends from a distortion; ``refine`` adds knots and learns the jitter."""
+    def learn(self, distortion: Distortion, steps: int = STEPS) -> Linear:
+        """The linear model after at most so many Gauss-Newton steps from a distortion; class, jitter and noise are learnt on the
+        way."""
         reduced, context = self.reduced, self.reduced.context
-        jitter = jitter or Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
-        learnings = LEARNINGS if refine else 0
-        covariances = reduced.covariances(reduced.read_slopes, jitter)
-        laid, weights, refined, selecting = None, None, 0, self.ratios is None and "friction" in self.modules
+        jitter = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
+        learnings, covariances = LEARNINGS, reduced.covariances(reduced.read_slopes, jitter)
+        laid, weights, refined, selecting = None, None, 0, "friction" in self.modules
         known: dict[str, float] = {}
-        ratios = np.empty(0) if self.ratios is None else self.ratios
+        ratios = np.empty(0)
         idle: set[str] = set()
         for step in range(steps):
             if laid is None or (not refined and _far(laid, distortion, context)):
                 laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules, ratios=ratios), None
-            if weights is None:
-                design = class_groups(reduced, reducer, distortion).joined(*self.fixed)
-                weights = design.split(self._solve(reducer, design, reduced.angles, covariances, known)[2].mean)
-            linear = self._linear(reducer, distortion, weights, covariances, known, jitter, idle)
+            linear = self._linear(reducer, distortion, covariances, known, jitter, idle, weights)
             known = linear.log_scale
             weights, before, idle = linear.weights, idle, idle | self._backward(linear)
             moved = self._moved(linear)
-            still = idle == before and length(moved, distortion, context) < 0.05 * LONGEST_STEP
+            still = idle == before and length(moved, distortion, context) < STILL
             if learnings and (still or step >= 4):
                 found = learn_jitter(linear)
                 learnings, jitter = learnings - 1 if found != jitter else 0, found
             covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
             finer = reducer
-            if refine and step >= FIRST_FLANK and selecting and ratios.size < MOST_FLANKS:
+            if step >= FIRST_FLANK and selecting and ratios.size < MOST_FLANKS:
                 ratios = select_flank(linear)
                 selecting = ratios.size > reducer.ratios.size
                 finer = replace(reducer, ratios=ratios)
-            elif refine and (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
+            elif (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
                 finer = _refined(linear)
                 refined += int(finer.richness > reducer.richness)
+            distortion = _towards(distortion, moved, _share(distortion, moved, context))
             if finer.richness > reducer.richness:
                 reducer, weights = finer, None
-                distortion = _towards(distortion, moved, context)
-                continue
-            if still and step >= 2 and not learnings:
+            elif still and step >= 2 and not learnings:
                 break
-            distortion = _towards(distortion, moved, context)
         return linear
+
+    def settle(self, like: Linear, distortion: Distortion) -> Linear:
+        """The linear model about the mode that is reached from a distortion, of the class, jitter and noise of ``like``: a step
+        is taken where it raises the posterior density of the nonlinear parameters, else it is shortened. A straight line
+        promises more than there is."""
+        context, covariances = self.reduced.context, self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter)
+        idle: set[str] = set()
+
+        def about(at: Distortion, known) -> Linear:
+            return self._linear(like.reducer, at, covariances, known, like.jitter, idle)
+
+        best, share = about(distortion, {}), 1.0
+        for _ in range(STEPS):
+            if not idle >= (backward := self._backward(best)):
+                idle |= backward
+                best = about(best.distortion, best.log_scale)
+            moved = self._moved(best)
+            at = _towards(best.distortion, moved, share * _share(best.distortion, moved, context))
+            if length(at, best.distortion, context) < STILL:
+                break
+            tried = about(at, best.log_scale)
+            if self._height(tried, best.log_scale) < self._height(best, best.log_scale):
+                share *= SHORTER
+            else:
+                best, share = tried, min(1.0, 2.0 * share)
+        return best
+
+    def _height(self, linear: Linear, log_scale) -> float:
+        """Log posterior density of the distortion: the log marginal likelihood where its parameters stay, times their prior at
+        known log scales."""
+        names, index = linear.design.names, linear.design.index
+        at, held, prior = np.zeros(index.size), np.zeros(index.size, bool), 0.0
+        for effect in (e for e in self.effects if isinstance(e, TangentEffect) and e.name in names):
+            own, value = index == names.index(effect.name), getattr(linear.distortion, effect.parameter)
+            at[own], held = value, held | own
+            prior -= 0.5 * (value / np.exp(log_scale[effect.name])) ** 2
+        scale = np.exp([linear.log_scale[n] for n in names])[index]
+        left = linear.data.moments.given(at, held)
+        return float(left.log_marginal(scale[~held])) + linear.data.log_volume + prior
 
     def _knots(self, distortion):
         torques, context = [], self.reduced.context
@@ -116,8 +150,12 @@ class Search:
             torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], history.log_amplitude, context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
-    def _linear(self, reducer, distortion, weights, covariances, known, jitter, idle):
+    def _linear(self, reducer, distortion, covariances, known, jitter, idle, weights=None):
+        """The linear model about a distortion; derivatives are those at ``weights``, by default the ones that fit best there."""
         core = class_groups(self.reduced, reducer, distortion)
+        if weights is None:
+            plain = core.joined(*self.fixed)
+            weights = plain.split(self._solve(reducer, plain, self.reduced.angles, covariances, known)[2].mean)
         tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
         design = core.joined(*self.fixed, *tangents)
         shift = _shift(design, distortion, self.effects, self.reduced.context)
@@ -192,10 +230,14 @@ def length(moved, distortion, context) -> float:
     return float(np.abs(_step(moved, distortion, context)).max())
 
 
-def _towards(distortion, moved, context):
-    share = min(1.0, LONGEST_STEP / max(length(moved, distortion, context), 1e-300))
-    values = {n: getattr(distortion, n) + share * (getattr(moved, n) - getattr(distortion, n)) for n in vars(distortion)}
-    return Distortion(**values)
+def _share(distortion, moved, context) -> float:
+    """Share of the way to another distortion that is no longer than the longest step."""
+    return min(1.0, LONGEST_STEP / max(length(moved, distortion, context), 1e-300))
+
+
+def _towards(distortion, moved, share: float) -> Distortion:
+    """A distortion on the way to another."""
+    return Distortion(**{n: v + share * (getattr(moved, n) - v) for n, v in vars(distortion).items()})
 
 
 def _far(laid, distortion, context) -> bool:

@@ -14,10 +14,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
 
 from backdrive_bayes.mechanics.history import History
-from backdrive_bayes.mechanics.relays import LEAST_WIDTH, ends, means, summed, surged, surged_sum
+from backdrive_bayes.mechanics.relays import LEAST_WIDTH, ends, means, summed, surged_ends, surged_means, surged_sum
 
 CROSSED = 0.7
 """Torque, in shares of the largest, by which clearances are crossed: relays beyond stand for friction near the loop's tip."""
@@ -89,34 +88,30 @@ class Cells:
     def means(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
         that differ)."""
-        if self.growth is not None:
-            return self._paired(surged(False, *self._surging(history)) @ _shares(history), sign)
-        return self._paired(means(*_segments(history), *self._relays(history.start, history.state)), sign)
+        along, relays = _segments(history), self._relays(history.start, history.state)
+        found = means(*along, *relays) if self.growth is None else surged_means(*along, *relays, *self._growing)
+        return self._paired(found, sign)
 
     def ends(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Responses at the end of every segment, shape (segments, cells)."""
-        if self.growth is not None:
-            return self._paired(surged(True, *self._surging(history)), sign)
-        return self._paired(ends(history.z1, *self._relays(history.start, history.state)), sign)
+        relays = self._relays(history.start, history.state)
+        found = ends(history.z1, *relays) if self.growth is None else surged_ends(history.z0, history.z1, *relays, *self._growing)
+        return self._paired(found, sign)
 
     def summed(self, history: History, weights, sign: float = 1.0) -> np.ndarray:
         """Block means times ``weights`` (cells,), (blocks,)."""
-        share = np.concatenate([weights * self.width / self.norm, sign * weights * self.width / self.norm])
-        if self.growth is not None:
-            found = surged_sum(share, *self._surging(history)) @ _shares(history)
-        else:
-            arguments = *_segments(history), *self._relays(history.start, history.state), share
-            found = summed(*arguments)
-        return found - 0.5 * (1.0 + sign) * float(weights @ (self.width / self.norm))
+        share = weights * self.width / self.norm
+        along = *_segments(history), *self._relays(history.start, history.state), np.concatenate([share, sign * share])
+        found = summed(*along) if self.growth is None else surged_sum(*along, *self._growing)
+        return found - 0.5 * (1.0 + sign) * float(share.sum())
 
-    def _surging(self, history):
-        """Torques, factors of the thresholds and all relays whose thresholds grow."""
+    @cached_property
+    def _growing(self):
+        """Factors at either end of every segment, and what of the thresholds of all relays they multiply."""
         follows = self.clearance & (self.up + self.width <= CROSSED)
         first, more = (np.where(self.clearance, 0.0, of) for of in self._thresholds)
-        relays = self._relays(history.start, history.state)
         # The first relay of a mirror image is the mirror image of the last.
-        thresholds = np.r_[first, first + more], np.r_[more, -more]
-        return history.z0, history.z1, *np.exp(self.growth), *relays, *thresholds, np.tile(follows, 2)
+        return *np.exp(self.growth), np.r_[first, first + more], np.r_[more, -more], np.tile(follows, 2)
 
     @cached_property
     def _both(self):
@@ -140,12 +135,6 @@ class Cells:
         """Responses of pairs (…, cells) from those of all relays (relays, …)."""
         one, other = response[: self.count], response[self.count :]
         return ((one + sign * other - 0.5 * (1.0 + sign)) * (self.width / self.norm)[:, None]).T
-
-
-def _shares(history):
-    """Shares of the segments in the blocks, sparse (segments, blocks)."""
-    rows = np.arange(history.weight.size)
-    return sparse.csr_array((history.weight, (rows, history.block)), shape=(rows.size, history.blocks))
 
 
 def _segments(history):

@@ -10,8 +10,6 @@ import numpy as np
 
 from backdrive_bayes.records.reduction import FEW, Blocks
 
-PIECES = 3
-"""Straight pieces a block: the torque within a block is nearly straight, turning points are nodes of their own."""
 FILM = 0.03
 """Torque, in shares of the largest, that passes at the usual rate while a film of lubricant takes on a new speed."""
 RESTING = 0.05
@@ -67,10 +65,9 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     ``offset`` is added to the torque that was read (a share of the scale), ``lag_s`` is by how much the angle channel is late.
     """
     sampled, who = _samples(blocks)
-    share = np.linspace(0.0, 1.0, PIECES + 1)
-    pieces = blocks.begin_s[:, None] + (blocks.end_s - blocks.begin_s)[:, None] * share
-    sampled, edges = sampled - lag_s, pieces[blocks.count > FEW].ravel() - lag_s
-    cuts = np.unique(np.r_[edges, sampled, blocks.path_s[1:-1], pieces[[0, -1], [0, -1]] - lag_s])
+    sampled, many, ends = sampled - lag_s, blocks.count > FEW, np.r_[blocks.begin_s[0], blocks.end_s[-1]]
+    edges = np.r_[blocks.begin_s[many], blocks.end_s[many], ends] - lag_s
+    cuts = np.unique(np.r_[edges, sampled, blocks.path_s[1:-1]])
     middle = 0.5 * (cuts[1:] + cuts[:-1])
     owner = np.clip(np.searchsorted(blocks.begin_s - lag_s, middle, side="right") - 1, 0, blocks.count.size - 1)
     # What passes in a gap between two blocks is in the mean of neither.

@@ -11,6 +11,8 @@ import numpy as np
 
 LEAST_WIDTH = 1e-2
 """Share of its width that a cell keeps however much thresholds grow: friction in proportion to the load ends where it locks."""
+RUN = 16
+"""Segments that are looked at together first: most cells rest through most of a leg. It changes the time alone."""
 
 
 @numba.njit(cache=True, inline="always")
@@ -109,26 +111,66 @@ def ends(z1, up, down, width, fall, first):
 
 
 @numba.njit(cache=True, nogil=True)
-def surged(ends, z0, z1, f0, f1, up, down, width, fall, first, threshold, more, follows):
-    """States (cells, segments) whose thresholds are multiplied by a factor that runs from f0 to f1 along each segment, means or
-    those at its end."""
-    out = np.empty((up.size, z0.size))
+def surged_means(z0, z1, weight, block, blocks, up, down, width, fall, first, f0, f1, threshold, more, follows):
+    """Means over blocks of states whose thresholds are multiplied by a factor that runs from f0 to f1 along each segment, shape
+    (cells, blocks)."""
+    out, mean, runs = np.zeros((up.size, blocks)), np.empty(z0.size), _runs(z1, f1)
     for j in range(up.size):
         edges = up[j], down[j], width[j], fall[j]
-        _surge(out[j], first[j], z0, z1, f0, f1, edges, threshold[j], more[j], follows[j], ends)
+        _surge(mean, first[j], z0, z1, f0, f1, runs, edges, threshold[j], more[j], follows[j], False)
+        for i in range(z0.size):
+            out[j, block[i]] += weight[i] * mean[i]
     return out
 
 
 @numba.njit(cache=True, nogil=True)
-def surged_sum(share, z0, z1, f0, f1, up, down, width, fall, first, threshold, more, follows):
-    """Means of the same times the cells' shares, (segments,)."""
-    mean, total = np.empty(z0.size), np.zeros(z0.size)
+def surged_sum(z0, z1, weight, block, blocks, up, down, width, fall, first, share, f0, f1, threshold, more, follows):
+    """The same times the cells' shares, (blocks,)."""
+    out, mean, total, runs = np.zeros(blocks), np.empty(z0.size), np.zeros(z0.size), _runs(z1, f1)
     for j in range(up.size):
         if share[j] != 0.0:
             edges = up[j], down[j], width[j], fall[j]
-            _surge(mean, first[j], z0, z1, f0, f1, edges, threshold[j], more[j], follows[j], False)
-            total += share[j] * mean
-    return total
+            _surge(mean, first[j], z0, z1, f0, f1, runs, edges, threshold[j], more[j], follows[j], False)
+            for i in range(z0.size):
+                total[i] += share[j] * mean[i]
+    for i in range(z0.size):
+        out[block[i]] += weight[i] * total[i]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def surged_ends(z0, z1, up, down, width, fall, first, f0, f1, threshold, more, follows):
+    """The same at the segments' ends, shape (cells, segments)."""
+    out, runs = np.empty((up.size, z0.size)), _runs(z1, f1)
+    for j in range(up.size):
+        edges = up[j], down[j], width[j], fall[j]
+        _surge(out[j], first[j], z0, z1, f0, f1, runs, edges, threshold[j], more[j], follows[j], True)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _runs(z1, f1):
+    """Lowest and highest torque, and factor, of every run of segments, (runs, 4)."""
+    out = np.empty((z1.size // RUN + 1, 4))
+    for k in range(0, z1.size, RUN):
+        z, f = z1[k : k + RUN], f1[k : k + RUN]
+        out[k // RUN] = z.min(), z.max(), f.min(), f.max()
+    return out
+
+
+@numba.njit(cache=True, inline="always")
+def _rests(run, x, edges, r, more, follows):
+    """Whether a state stays through a run: it does where it does at the run's least and largest factor."""
+    low, high, least, most = run
+    a, b, u, d = edges
+    for factor in (least, most):
+        g = factor - 1.0
+        above, below = a + r * g + x * (u + more * g), b - r * g + x * max(d - more * g, LEAST_WIDTH * d)
+        if follows:
+            above, below = factor * (a + x * u), factor * (b + x * d)
+        if (x < 1.0 and high > above) or (x > 0.0 and low < below):
+            return False
+    return True
 
 
 @numba.njit(cache=True, inline="always")
@@ -142,27 +184,31 @@ def _edges(z, factor, edges, r, more, follows):
 
 
 @numba.njit(cache=True, nogil=True)
-def _surge(out, x, z0, z1, f0, f1, edges, r, more, follows, ends):
+def _surge(out, x, z0, z1, f0, f1, runs, edges, r, more, follows, ends):
     """States (segments,) of one cell: the upper torque of a play rises, and its lower one falls, by what its threshold gains,
     which is ``r`` at its first relay and ``more`` than that at its last; a clearance that ``follows`` feels the torque divided by
     the factor."""
-    for i in range(z0.size):
-        p1, q1, u1, d1 = _edges(z1[i], f1[i], edges, r, more, follows)
-        # Most cells rest on most segments: that takes no division.
-        if i > 0 and (x >= 1.0 or p1 <= x * u1) and (x <= 0.0 or q1 >= x * d1):
-            out[i] = x
+    for k in range(0, z0.size, RUN):
+        if k > 0 and _rests(runs[k // RUN], x, edges, r, more, follows):
+            out[k : k + RUN] = x
             continue
-        p0, q0, u0, d0 = _edges(z0[i], f0[i], edges, r, more, follows)
-        p0, p1, q0, q1 = p0 / u0, p1 / u1, q0 / d0, q1 / d1
-        if i == 0:
-            x = min(max(x, min(p0, 1.0)), max(q0, 0.0))
-        mean = x
-        if p1 > p0 and p1 > x and x < 1.0:
-            turn = max(p0, x)
-            mean = (x * (turn - p0) + _integral(p1) - _integral(turn)) / (p1 - p0)
-            x = max(x, min(p1, 1.0))
-        elif q1 < q0 and q1 < x and x > 0.0:
-            turn = min(q0, x)
-            mean = (x * (q0 - turn) + _integral(turn) - _integral(q1)) / (q0 - q1)
-            x = min(x, max(q1, 0.0))
-        out[i] = x if ends else mean
+        for i in range(k, min(k + RUN, z0.size)):
+            p1, q1, u1, d1 = _edges(z1[i], f1[i], edges, r, more, follows)
+            # Resting takes no division.
+            if i > 0 and (x >= 1.0 or p1 <= x * u1) and (x <= 0.0 or q1 >= x * d1):
+                out[i] = x
+                continue
+            p0, q0, u0, d0 = _edges(z0[i], f0[i], edges, r, more, follows)
+            p0, p1, q0, q1 = p0 / u0, p1 / u1, q0 / d0, q1 / d1
+            if i == 0:
+                x = min(max(x, min(p0, 1.0)), max(q0, 0.0))
+            mean = x
+            if p1 > p0 and p1 > x and x < 1.0:
+                turn = max(p0, x)
+                mean = (x * (turn - p0) + _integral(p1) - _integral(turn)) / (p1 - p0)
+                x = max(x, min(p1, 1.0))
+            elif q1 < q0 and q1 < x and x > 0.0:
+                turn = min(q0, x)
+                mean = (x * (q0 - turn) + _integral(turn) - _integral(q1)) / (q0 - q1)
+                x = min(x, max(q1, 0.0))
+            out[i] = x if ends else mean

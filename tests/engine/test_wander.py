@@ -7,7 +7,7 @@ import pytest
 
 from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise, physical_reducer, simulate_unit
 from backdrive_bayes.engine.reduced import reduce_unit
-from backdrive_bayes.engine.search import STEPS, Search
+from backdrive_bayes.engine.search import Search
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import BASELINE
@@ -25,7 +25,7 @@ def learnt(size: float):
         slow = BenchNoise(0.0, size, TIME * r.time_s[-1] / 2.5, 0.0)
         records.append(replace(r, angle_rad=r.angle_rad + angle_noise(r.time_s.size, r.time_s[1] - r.time_s[0], slow, rng)))
     reduced = reduce_unit(replace(unit, records=tuple(records)), 120)
-    return learn_wander(Search.over(reduced, library_terms(), BASELINE).run(Distortion(), STEPS, refine=True))
+    return learn_wander(Search.over(reduced, library_terms(), BASELINE).learn(Distortion()))
 
 
 def test_a_planted_wander_is_learnt_at_its_size_and_time():

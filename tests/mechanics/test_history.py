@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.bench import path_of
 
-from backdrive_bayes.mechanics.history import PIECES, of_blocks, through
+from backdrive_bayes.mechanics.history import of_blocks, through
 from backdrive_bayes.records.reduction import Blocks
 
 SCALE, RATE = 0.1, 0.05
@@ -32,8 +32,8 @@ def test_the_mean_torque_of_a_block_is_the_one_that_was_read():
     blocks = ramped()
     history = of_blocks(blocks, SCALE)
     np.testing.assert_allclose(middle(history), blocks.torque_nm / SCALE, atol=1e-12)
-    # A knot of the path in the middle of a block cuts one of its pieces.
-    assert history.z0.size == (PIECES + 1) * blocks.count.size and history.blocks == blocks.count.size
+    # A knot of the path in the middle of a block cuts it in two.
+    assert history.z0.size == 2 * blocks.count.size and history.blocks == blocks.count.size
 
 
 def test_weights_of_a_block_sum_to_one():
