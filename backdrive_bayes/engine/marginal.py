@@ -243,8 +243,8 @@ def _slopes(moments: Moments, scale, first) -> tuple[np.ndarray, np.ndarray]:
 
 @numba.njit(cache=True)
 def _by_scales(inverse, mean, scale):
-    """Sums of M_ij m_i m_j and of M_ij^2 over the weights of two scales, both (scales, scales), of a symmetric M whose lower half is
-    given."""
+    """Sums of M_ij m_i m_j and of M_ij^2 over the weights of two scales, both (scales, scales), for a symmetric M of which the
+    lower half is given."""
     turned, square = np.zeros((scale[-1] + 1, scale[-1] + 1)), np.zeros((scale[-1] + 1, scale[-1] + 1))
     for j in range(mean.size):
         for i in range(j, mean.size):

@@ -8,7 +8,7 @@ from support.planted import MORE, SCALE, UNITS, by_hand, joint_mode, planted, sm
 
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine import search
-from backdrive_bayes.engine.design import class_groups, class_priors
+from backdrive_bayes.engine.design import Design, class_groups, class_priors
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.jitter import learn_jitter
 from backdrive_bayes.engine.linearise import linearise
@@ -20,8 +20,8 @@ from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.gap.hypotheses import weigh
-from backdrive_bayes.mechanics.effect import Distortion
-from backdrive_bayes.mechanics.reducer import HALVINGS, ReducerClass
+from backdrive_bayes.mechanics.effect import Distortion, TangentEffect
+from backdrive_bayes.mechanics.reducer import BASELINE, HALVINGS, ReducerClass
 from backdrive_bayes.mechanics.registry import LIBRARY, library_terms
 
 
@@ -260,3 +260,48 @@ def test_an_angle_that_stands_still_is_one_clear_line():
     frozen = replace(unit, records=tuple(replace(r, angle_rad=np.zeros(r.angle_rad.size)) for r in unit.records))
     with pytest.raises(BadInput, match="an angle that moves"):
         prepare(frozen)
+
+
+@pytest.fixture(scope="module")
+def searching():
+    """The search of a unit with an offset and what was learnt of its class and noise."""
+    unit = reduce_unit(planted(offset_nm=-3e-4, loops=MORE))
+    free = search.Search.over(unit, library_terms(), BASELINE)
+    return free, free.learn(Distortion())
+
+
+def overshooting(monkeypatch):
+    """Steps go three times as far as they should."""
+    right = search.Search._moved
+
+    def moved(self, linear):
+        there, here = right(self, linear), linear.distortion
+        return replace(here, offset=here.offset + 3.0 * (there.offset - here.offset))
+
+    monkeypatch.setattr(search.Search, "_moved", moved)
+
+
+def test_a_step_that_promises_too_much_is_shortened(searching, monkeypatch):
+    free, like = searching
+    overshooting(monkeypatch)
+    start = replace(like.distortion, offset=like.distortion.offset + 6e-4)
+    ended = free.settle(like, start)
+    assert ended.distortion.offset == pytest.approx(-3e-4 / SCALE, abs=3e-4)
+    begun = free.settle(like, like.distortion)
+    assert free._height(ended, begun.log_scale) > free._height(begun, begun.log_scale) - 1.0
+    monkeypatch.setattr(search.Search, "_height", lambda *_: 0.0)
+    assert free.settle(like, start).distortion.offset != pytest.approx(-3e-4 / SCALE, abs=3e-4), "a planted fault: all are taken"
+
+
+def test_the_height_of_a_distortion_is_that_of_the_data_less_its_shift(searching):
+    """With the weights of the tangents at the distortion nothing is left of the shift."""
+    free, like = searching
+    tangents = {e.name: getattr(like.distortion, e.parameter) for e in free.effects if isinstance(e, TangentEffect)}
+    moved = like.design.predict({n: np.array([value]) for n, value in tangents.items() if n in like.design.names})
+    groups = tuple(g for g in like.design.groups if g.name not in tangents)
+    angles = [a - shift for a, shift in zip(like.angles, moved, strict=True)]
+    data = whiten(Design(groups).records(), angles, like.covariances, like.data.noise_dof, like.reduced.settled)
+    scale = np.repeat([np.exp(like.log_scale[g.name]) for g in groups], [g.width for g in groups])
+    apart = [value / np.exp(like.log_scale[n]) for n, value in tangents.items() if n in like.design.names]
+    prior = -0.5 * np.sum(np.square(apart))
+    assert free._height(like, like.log_scale) == pytest.approx(data.log_marginal(scale) + data.log_volume + prior, abs=1e-6)

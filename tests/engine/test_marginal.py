@@ -250,3 +250,15 @@ def test_further_columns_weigh_as_if_they_had_been_there_and_gains_are_exact(pro
     assert contrasts.gains(base, columns[None], size[None]) == pytest.approx([exact])
     linear = 0.5 * (data.noise_dof + data.samples) * (1.0 - contrasts.chi2(whole) / contrasts.chi2(base))
     assert abs(linear - exact) > 0.05 * abs(exact)
+
+
+def test_weights_that_are_known_are_taken_off_the_data(problem):
+    columns, angles, covariances = problem
+    held, scale = np.isin(np.arange(WEIGHTS), [1, 4]), CASES[0]
+    values = np.where(held, np.linspace(-1.0, 2.0, WEIGHTS), np.nan)
+    data = whiten(columns, angles, covariances, DOF)
+    left = [a - x[:, held] @ values[held] for x, a in zip(columns, angles, strict=True)]
+    direct = whiten([x[:, ~held] for x in columns], left, covariances, DOF)
+    given = data.moments.given(values, held)
+    assert given.log_marginal(scale[~held]) == pytest.approx(direct.log_marginal(scale[~held]))
+    assert given.log_marginal(scale[~held]) != pytest.approx(data.moments.given(-values, held).log_marginal(scale[~held]))

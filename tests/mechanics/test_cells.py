@@ -201,3 +201,36 @@ def test_states_bound_the_neutral_one(name):
     assert np.all(lower <= neutral + 1e-15) and np.all(neutral <= upper + 1e-15)
     if name == "friction":
         assert np.any(lower < upper - 1e-3), "a free initial state must make a difference"
+
+
+@pytest.mark.parametrize("name", ["elastic", "friction", "clearance"])
+@pytest.mark.parametrize("state", START)
+def test_thresholds_that_grow_alike_all_along_are_wider_ones(name, state):
+    """Cells that rest are passed over many segments at a time."""
+    torque = path(np.array([0.0, 0.9, -1.1, 0.4, -0.3, 1.0, 0.2]), 53)
+    history, log_factor = along(torque, state=state), 0.2
+    growing, wide = CELLS[name].grown(np.full((2, history.z0.size), log_factor)), CELLS[name].wider(np.exp(log_factor))
+    # The state at first is that of thresholds that have not grown.
+    moved = slice(60, None)
+    np.testing.assert_allclose(growing.ends(history)[moved], wide.ends(history)[moved], atol=1e-12)
+    np.testing.assert_allclose(growing.means(history)[moved], wide.means(history)[moved], atol=1e-12)
+
+
+def test_thresholds_that_follow_the_rate_are_those_of_relays_at_every_moment():
+    """Relays, each with a play of its own, against a cell along a path whose factor changes in every segment."""
+    torque, cell = path(np.array([0.0, 0.9, -1.0, 0.5, -0.4, 1.0]), 400), CELLS["friction"]
+    history = along(torque)
+    factor = 1.0 + 0.3 * np.sin(np.linspace(0.0, 9.0, torque.size))
+    growing = cell.grown(np.log(np.stack([factor[:-1], factor[1:]])))
+    share = (np.arange(RELAYS) + 0.5) / RELAYS
+    up, down = (edge[0] + cell.width[0] * share for edge in (cell.up, cell.down))
+    both = [(up, down), (-down[::-1], -up[::-1])]
+    states = [np.clip((2.0 * torque[0] - a - b) / (2.0 * cell.width[0]) + 0.5 > share, 0.0, 1.0) for a, b in both]
+    found = np.empty(history.z1.size)
+    for i, (z, more) in enumerate(zip(torque[1:], factor[1:] - 1.0, strict=True)):
+        for k, (a, b) in enumerate(both):
+            extra = 0.5 * (a - b) * more
+            states[k] = np.where(z >= a + extra, 1.0, np.where(z <= b - extra, 0.0, states[k]))
+        found[i] = sum(s.mean() for s in states) - 1.0
+    settled = slice(420, None)
+    np.testing.assert_allclose(growing.ends(history)[settled, 0], (found * cell.width[0] / cell.norm[0])[settled], atol=2e-3)
