@@ -22,6 +22,9 @@ UNREAD = 0.15
 UNREAD_LENGTH = 0.1
 """Torque that acts on the reducer and is not read (ripple, cables), in the torque noise of a sample, and the torque, in shares of
 the largest, over which it changes: a flank is crossed with one value of it."""
+ZERO = 0.5
+"""How far the torque channel's zero of one record is from that of another, in the torque noise of a sample: a bridge warms, a
+cable hangs otherwise. Half of the noise is too little to be seen in the torque itself."""
 WHITE_SHARE = 0.2
 """Share of the white noise's standard deviation that is left in a block mean, for the scale of traces."""
 
@@ -114,7 +117,7 @@ class BlockMeans:
         for blocks, noise in zip(self.blocks, self.noise, strict=True):
             apart = np.abs(blocks.torque_nm[:, None] - blocks.torque_nm) / self.torque_scale_nm
             apart[blocks.leg[:, None] != blocks.leg] = np.inf
-            unread = (UNREAD * noise.torque_nm) ** 2 * np.exp(-apart / UNREAD_LENGTH)
+            unread = noise.torque_nm**2 * (UNREAD**2 * np.exp(-apart / UNREAD_LENGTH) + ZERO**2)
             found.append((channel_covariance(blocks, noise), apart, unread))
         return found
 

@@ -83,6 +83,7 @@ NUMBERS = {
     "creep_times": str(viscoelastic_creep.TIMES),
     "creep_before": f"{viscoelastic_creep.BEFORE:g}",
     "unread": f"{reduced.UNREAD:g}",
+    "zero": f"{reduced.ZERO:g}",
     "unread_length": f"{reduced.UNREAD_LENGTH:g}",
     "bend_error": f"{covariance.BEND_ERROR:g}",
     "trace": f"{traces.TRACE:g}",

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.bench import block_means, even_blocks, known_estimate, noise_paths, path_of, raw_covariance
+from support.planted import planted
 
 from backdrive_bayes.bench.known_truth import BenchNoise
+from backdrive_bayes.engine import reduced as engine
 from backdrive_bayes.engine.covariance import BEND_ERROR, channel_covariance, local_slope, path_covariance, whitener
+from backdrive_bayes.engine.reduced import Jitter, reduce_unit
 from backdrive_bayes.records.reduction import Blocks
 
 NOISE = BenchNoise(white_rad=3e-5, correlated_rad=7e-5, correlation_time_s=0.03)
@@ -147,3 +150,14 @@ def test_slopes_stay_of_their_size_where_the_torque_stands_still_in_most_blocks(
     angle = np.linspace(0.0, 2e-2, still.size)
     smooth = local_slope(blocks_at(np.linspace(0.0, 9.0, still.size), error=0.1), angle)
     assert np.max(local_slope(blocks_at(still, error=0.1), angle)) < 10 * np.max(smooth)
+
+
+def test_the_torque_zero_of_a_record_moves_all_its_blocks(monkeypatch):
+    """Blocks far from each other, on legs of either direction, share the angle by which the slope answers a zero."""
+    unit = reduce_unit(planted())
+    slopes, noise, jitter = unit.read_slopes, unit.noise[0], Jitter(1e-6, 0.002)
+    usual = unit.covariances(slopes, jitter)[0]
+    monkeypatch.setattr(engine, "ZERO", 0.0)
+    less = replace(unit).covariances(slopes, jitter)[0]
+    shared = (0.5 * noise.torque_nm / unit.angle_scale_rad) ** 2 * np.outer(slopes[0], slopes[0])
+    np.testing.assert_allclose(usual - less, shared, atol=1e-9 * shared.max())

@@ -5,9 +5,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.planted import LOOPS, PERIOD_RAD, UNITS, VARIANTS, changed, planted, prepared, smooth_reducer
+from support.planted import LOOPS, MORE, NOISE, PERIOD_RAD, UNITS, VARIANTS, changed, planted, prepared, smooth_reducer
 
-from backdrive_bayes.engine import periodic
+from backdrive_bayes.engine import periodic, reduced
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.gap import hypotheses
@@ -151,3 +151,12 @@ def test_one_rate_says_nothing_of_a_law_of_the_rate():
 
 def test_weighing_again_gives_the_same_numbers():
     assert weigh(prepared("none")).log_factor == found("none")[0].log_factor
+
+
+def test_zeros_of_the_torque_channel_that_differ_between_records_are_hardly_an_effect(monkeypatch):
+    """By up to five times what is usual; without a zero of each record's own more is found."""
+    unit, zeros = planted(known=smooth_reducer(), loops=MORE), NOISE.torque_nm * np.array([2.1, -2.4, 0.9, -1.5])
+    moved = replace(unit, records=tuple(replace(r, torque_nm=r.torque_nm + z) for r, z in zip(unit.records, zeros, strict=True)))
+    best = max(weigh(prepare(moved)).log_factor.values())
+    monkeypatch.setattr(reduced, "ZERO", 0.0)
+    assert max(weigh(prepare(moved)).log_factor.values()) > best + 5.0
