@@ -28,14 +28,14 @@ BENT = 2.0
 def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tuple[Group, ...], float]:
     """The mode of a search where every effect may act, and the encoder's wave with its frequency if it has one.
 
-    Class, jitter and noise are learnt from the best start; it is the higher of the ends of searches from there and from an
-    undistorted bench, and beside the clearest wave of what is left there, if that is higher still, each with the wander of the
-    reading that it leaves.
+    It is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside the clearest
+    wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
     """
-    starts = _apart([Distortion(), *starts], free.reduced.context)
-    begin = max(starts, key=lambda start: free.learn(start, TRIAL_STEPS).log_marginal) if len(starts) > 1 else starts[0]
-    like = free.learn(begin)
-    ends = [free.settle(like, at) for at in (like.distortion, *({Distortion(), begin} - {begin}))]
+    others = _apart([Distortion(), *starts], free.reduced.context)[1:]
+    begins = [Distortion()]
+    if others:
+        begins.append(max(others, key=lambda start: free.learn(start, TRIAL_STEPS).log_marginal) if len(others) > 1 else others[0])
+    ends = [free.settle(like, like.distortion) for like in map(free.learn, begins)]
     joint = max(ends, key=lambda ended: ended.log_marginal)
     waves: tuple[Group, ...] = ()
     wandering, gain = learn_wander(joint)
