@@ -160,13 +160,16 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
 
 
 def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
-    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify."""
-    rates = zip(reduced.context.log_rate, grown, strict=True)
-    laws = [reduced.context.law(rate + history.surge, history.log_amplitude) for rate, (history, _) in rates]
-    identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in laws])) > LEAST_RANGE]
+    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion."""
+    def laws(along):
+        rates = zip(reduced.context.log_rate, along, strict=True)
+        return [reduced.context.law(rate + history.surge, history.log_amplitude) for rate, history in rates]
+
+    read = laws(histories(reduced, Distortion()))
+    identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in read])) > LEAST_RANGE]
     columns = [
         reducer.grown(history, weights, growth, identified[0].part, [law[e.term] for e in identified])
-        for (history, growth), law in zip(grown, laws, strict=True)
+        for (history, growth), law in zip(grown, laws([history for history, _ in grown]), strict=True)
         if identified
     ]
     return [Group(e.name, tuple(c[:, None] for c in of)) for e, of in zip(identified, zip(*columns, strict=True), strict=True)]

@@ -32,28 +32,29 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
     wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
     """
     others = _apart([Distortion(), *starts], free.reduced.context)[1:]
-    begins = [Distortion()]
-    if others:
-        begins.append(max(others, key=lambda start: free.learn(start, TRIAL_STEPS).log_marginal) if len(others) > 1 else others[0])
-    ends = [free.settle(like, like.distortion) for like in map(free.learn, begins)]
+    if len(others) > 1:
+        others = [max(others, key=lambda start: free.learn(start, TRIAL_STEPS).log_marginal)]
+    ends = [free.find_mode(like, like.distortion) for like in map(free.learn, [Distortion(), *others])]
     joint = max(ends, key=lambda ended: ended.log_marginal)
     waves: tuple[Group, ...] = ()
     wandering, gain = learn_wander(joint)
     clear, frequency = clearest_wave(joint)
     if clear > 0:
         wave = periodic_group(joint, frequency)
-        waved = replace(free, fixed=(*free.fixed, wave)).settle(joint, joint.distortion)
+        # A class that was learnt without the wave has spent itself on it.
+        beside = replace(free, fixed=(*free.fixed, wave))
+        waved = beside.find_mode(beside.learn(joint.distortion), joint.distortion)
         # Of a large wave, what the encoder reads is not the angle at which it errs.
         turned = periodic_group(waved, frequency)
-        nearer = replace(free, fixed=(*free.fixed, turned)).settle(waved, waved.distortion)
+        nearer = replace(free, fixed=(*free.fixed, turned)).find_mode(waved, waved.distortion)
         if nearer.log_marginal > waved.log_marginal:
             wave, waved = turned, nearer
-        beside, more = learn_wander(waved)
+        steady, more = learn_wander(waved)
         if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain and rises(waved, frequency):
-            joint, waves, wandering, gain = waved, (wave,), beside, more
+            joint, waves, wandering, gain = waved, (wave,), steady, more
     if gain > 0:
         again = replace(free, reduced=wandering, fixed=(*free.fixed, *waves))
-        joint = again.settle(joint, joint.distortion)
+        joint = again.find_mode(joint, joint.distortion)
     return joint, waves, frequency
 
 
@@ -77,7 +78,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     def mode(some: tuple[str, ...]) -> Linear:
         fixed = (*free.fixed, *(waves if WAVE in some else ()))
         own = replace(free, reduced=joint.reduced, fixed=fixed, only=some)
-        return own.settle(joint, _only(reach if LAW in some else lawless, some))
+        return own.find_mode(joint, _only(reach if LAW in some else lawless, some))
 
     apart: dict[tuple[str, ...], Linear] = {}
     if LAW not in bent and any(term.name in joint.design.names for term in all_effects()[LAW]):
@@ -86,6 +87,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent
     if bent:
         apart |= {some: apart.get(some) or mode(some) for some in ((), *((name,) for name in bent))}
+        bent = tuple(name for name in bent if name != WAVE or rises(apart[(WAVE,)], frequency))
         # Of two that act together each alone is likelier than nothing; beside a law of the rate no creep acted.
         least = apart[()].log_marginal
         likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
@@ -97,14 +99,14 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
 
 def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
     """The same where thresholds follow the amplitude alone, as nearly as that makes them grow as much."""
-    along = grown_histories(joint.reduced, reach)
-    amplitude = np.array([history.log_amplitude for history, _ in along])
+    along, context = grown_histories(joint.reduced, reach), joint.reduced.context
+    law = np.array([context.law(0.0, history.log_amplitude)[2:] for history, _ in along])
     growth = np.array([[np.mean(g) for g in grown] for _, grown in along])
-    apart = amplitude - amplitude.mean()
-    if np.abs(apart).max() < LEAST_RANGE:
+    if np.ptp(law[:, 0]) < LEAST_RANGE:
         return reach
-    friction, drag = apart @ growth / (apart @ apart)
-    return replace(reach, friction_amplitude=float(friction), drag_amplitude=float(drag))
+    (friction, drag), (friction_bend, drag_bend) = np.linalg.lstsq(law, growth - growth.mean(axis=0), rcond=None)[0].tolist()
+    lines = {"friction_amplitude": friction, "drag_amplitude": drag}
+    return replace(reach, **lines, friction_amplitude_bend=friction_bend, drag_amplitude_bend=drag_bend)
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:

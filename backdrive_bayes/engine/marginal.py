@@ -56,13 +56,14 @@ class Moments:
         """The same with the likelihood raised to a power, as if there were fewer independent samples of the same noise."""
         return Moments(self.inner * power, self.samples * power, self.noise_dof)
 
-    def given(self, values, held) -> Moments:
-        """Moments of the other weights where those ``held`` (weights,) have ``values`` (weights,)."""
+    def holding(self, values, held, scale) -> Moments:
+        """Moments of the other weights where those ``held`` (weights,) have ``values`` (weights,), with standard deviations
+        ``scale`` (weights,): they count as that many more samples, and what comes out is the joint density of both."""
         rest, turned = np.r_[~held, True], np.r_[np.where(held, -values, 0.0), 1.0]
         inner, seen = self.inner[np.ix_(rest, rest)], self.inner @ turned
         inner[-1] = inner[:, -1] = seen[rest]
-        inner[-1, -1] = turned @ seen
-        return replace(self, inner=inner)
+        inner[-1, -1] = turned @ seen + np.sum((values / scale)[held] ** 2)
+        return replace(self, inner=inner, samples=self.samples + float(held.sum()))
 
     def log_marginal(self, scale) -> np.ndarray:
         """Log marginal likelihoods (...) for standard deviations ``scale`` (..., weights), up to a constant."""

@@ -23,7 +23,7 @@ UNREAD_LENGTH = 0.1
 """Torque that acts on the reducer and is not read (ripple, cables), in the torque noise of a sample, and the torque, in shares of
 the largest, over which it changes: a flank is crossed with one value of it."""
 ZERO = 0.5
-"""How far the torque channel's zero of one record is from that of another, in the torque noise of a sample: a bridge warms, a
+"""How far the torque channel's zero of a record is from that of all, in the torque noise of a sample: a bridge warms, a
 cable hangs otherwise. Half of the noise is too little to be seen in the torque itself."""
 WHITE_SHARE = 0.2
 """Share of the white noise's standard deviation that is left in a block mean, for the scale of traces."""
@@ -112,7 +112,8 @@ class BlockMeans:
 
     @cached_property
     def _still(self) -> list[tuple]:
-        """What no slope changes: the angle channel's covariance, distances of torques within legs and the torque not read."""
+        """What no slope changes: the angle channel's covariance, distances of torques within legs, and the torque not read with
+        the record's zero."""
         found = []
         for blocks, noise in zip(self.blocks, self.noise, strict=True):
             apart = np.abs(blocks.torque_nm[:, None] - blocks.torque_nm) / self.torque_scale_nm

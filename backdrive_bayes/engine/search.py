@@ -36,8 +36,8 @@ LEARNINGS = 4
 STEPS = 14
 LONGEST_STEP, STILL = 2e-3, 1e-4
 """Longest step of a distortion, in shares of the torque, exponents fifty times as much, and one so short that the search ends."""
-SHORTER = 0.25
-"""Share to which a step that does not rise is shortened."""
+SHORTER, MOST_LENGTHENED = 0.25, 8.0
+"""Share to which a step that does not rise is shortened, and by how much one may be lengthened while they rise."""
 LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"
 BENDING = {
     "torque_offset": ("offset",),
@@ -97,18 +97,20 @@ class Search:
             elif (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
                 finer = _refined(linear)
                 refined += int(finer.richness > reducer.richness)
-            distortion = _towards(distortion, moved, _share(distortion, moved, context))
+            distortion = _towards(distortion, moved, min(1.0, LONGEST_STEP / max(length(moved, distortion, context), STILL)))
             if finer.richness > reducer.richness:
                 reducer, weights = finer, None
             elif still and step >= 2 and not learnings:
                 break
         return linear
 
-    def settle(self, like: Linear, distortion: Distortion) -> Linear:
-        """The linear model about the mode that is reached from a distortion, of the class, jitter and noise of ``like``: a step
-        is taken where it raises the posterior density of the nonlinear parameters, else it is shortened. A straight line
-        promises more than there is."""
-        context, covariances = self.reduced.context, self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter)
+    def find_mode(self, like: Linear, distortion: Distortion) -> Linear:
+        """The linear model about the mode that is reached from a distortion, of the class and jitter of ``like``, and of its
+        noise where both are of the same block means: a step is taken where it raises the log density of the nonlinear parameters,
+        else it is shortened. A straight line promises more than there is, or less."""
+        context, covariances = self.reduced.context, like.covariances
+        if self.reduced is not like.reduced:
+            covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
         idle: set[str] = set()
 
         def about(at: Distortion, known) -> Linear:
@@ -120,28 +122,26 @@ class Search:
                 idle |= backward
                 best = about(best.distortion, best.log_scale)
             moved = self._moved(best)
-            at = _towards(best.distortion, moved, share * _share(best.distortion, moved, context))
-            if length(at, best.distortion, context) < STILL:
+            apart = length(moved, best.distortion, context)
+            if share * apart < STILL:
                 break
-            tried = about(at, best.log_scale)
-            if self._height(tried, best.log_scale) < self._height(best, best.log_scale):
+            tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best.log_scale)
+            if self._log_density(tried, best.log_scale) < self._log_density(best, best.log_scale):
                 share *= SHORTER
             else:
-                best, share = tried, min(1.0, 2.0 * share)
+                best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
         return best
 
-    def _height(self, linear: Linear, log_scale) -> float:
-        """Log posterior density of the distortion: the log marginal likelihood where its parameters stay, times their prior at
-        known log scales."""
+    def _log_density(self, linear: Linear, log_scale) -> float:
+        """Log density of the data and a distortion at known log scales of its parameters, up to a constant."""
         names, index = linear.design.names, linear.design.index
-        at, held, prior = np.zeros(index.size), np.zeros(index.size, bool), 0.0
-        for effect in (e for e in self.effects if isinstance(e, TangentEffect) and e.name in names):
-            own, value = index == names.index(effect.name), getattr(linear.distortion, effect.parameter)
-            at[own], held = value, held | own
-            prior -= 0.5 * (value / np.exp(log_scale[effect.name])) ** 2
+        values, held = np.zeros(index.size), np.zeros(index.size, bool)
         scale = np.exp([linear.log_scale[n] for n in names])[index]
-        left = linear.data.moments.given(at, held)
-        return float(left.log_marginal(scale[~held])) + linear.data.log_volume + prior
+        for effect in (e for e in self.effects if isinstance(e, TangentEffect) and e.name in names):
+            own = index == names.index(effect.name)
+            values[own], held[own] = getattr(linear.distortion, effect.parameter), True
+            scale[own] = np.exp(log_scale[effect.name])
+        return float(linear.data.moments.holding(values, held, scale).log_marginal(scale[~held])) + linear.data.log_volume
 
     def _knots(self, distortion):
         torques, context = [], self.reduced.context
@@ -228,11 +228,6 @@ def _step(moved, distortion, context):
 def length(moved, distortion, context) -> float:
     """Largest part of the step between two distortions, in shares of the torque scale."""
     return float(np.abs(_step(moved, distortion, context)).max())
-
-
-def _share(distortion, moved, context) -> float:
-    """Share of the way to another distortion that is no longer than the longest step."""
-    return min(1.0, LONGEST_STEP / max(length(moved, distortion, context), 1e-300))
 
 
 def _towards(distortion, moved, share: float) -> Distortion:

@@ -67,7 +67,7 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     sampled, who = _samples(blocks)
     sampled, many, ends = sampled - lag_s, blocks.count > FEW, np.r_[blocks.begin_s[0], blocks.end_s[-1]]
     edges = np.r_[blocks.begin_s[many], blocks.end_s[many], ends] - lag_s
-    cuts = np.unique(np.r_[edges, sampled, blocks.path_s[1:-1]])
+    cuts = np.unique(np.r_[edges, sampled, blocks.path_s[1:-1], _bends(blocks.path_s, blocks.path_nm / torque_scale_nm)])
     middle = 0.5 * (cuts[1:] + cuts[:-1])
     owner = np.clip(np.searchsorted(blocks.begin_s - lag_s, middle, side="right") - 1, 0, blocks.count.size - 1)
     # What passes in a gap between two blocks is in the mean of neither.
@@ -99,6 +99,15 @@ def through(time_s, torque_nm, torque_scale_nm: float) -> History:
     time = np.asarray(time_s, float)
     surge = _surge(time, z, np.stack([time[:-1], time[1:]]))
     return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count, surge)
+
+
+def _bends(time_s, z) -> np.ndarray:
+    """Instants [s] at which the loading rate about them bends, none where it is the same everywhere."""
+    if np.ndim(_surge(time_s, z, time_s)) == 0:
+        return np.empty(0)
+    half = FILM * (time_s[-1] - time_s[0]) / np.abs(np.diff(z)).sum()
+    found = np.r_[time_s - half, time_s + half]
+    return found[(found > time_s[0]) & (found < time_s[-1])]
 
 
 def _surge(time_s, z, at_s) -> np.ndarray | float:

@@ -165,6 +165,7 @@ def _rests(run, x, edges, r, more, follows):
     a, b, u, d = edges
     for factor in (least, most):
         g = factor - 1.0
+        # Without its least width the upper bound is lower and straight in the factor, so that both ends tell.
         above, below = a + r * g + x * (u + more * g), b - r * g + x * max(d - more * g, LEAST_WIDTH * d)
         if follows:
             above, below = factor * (a + x * u), factor * (b + x * d)

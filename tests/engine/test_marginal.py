@@ -252,13 +252,19 @@ def test_further_columns_weigh_as_if_they_had_been_there_and_gains_are_exact(pro
     assert abs(linear - exact) > 0.05 * abs(exact)
 
 
-def test_weights_that_are_known_are_taken_off_the_data(problem):
+def test_held_weights_and_the_data_have_the_dense_joint_density(problem):
+    """Of both the data and the held weights, up to a constant: by a multivariate t of everything that is seen."""
     columns, angles, covariances = problem
     held, scale = np.isin(np.arange(WEIGHTS), [1, 4]), CASES[0]
-    values = np.where(held, np.linspace(-1.0, 2.0, WEIGHTS), np.nan)
-    data = whiten(columns, angles, covariances, DOF)
-    left = [a - x[:, held] @ values[held] for x, a in zip(columns, angles, strict=True)]
-    direct = whiten([x[:, ~held] for x in columns], left, covariances, DOF)
-    given = data.moments.given(values, held)
-    assert given.log_marginal(scale[~held]) == pytest.approx(direct.log_marginal(scale[~held]))
-    assert given.log_marginal(scale[~held]) != pytest.approx(data.moments.given(-values, held).log_marginal(scale[~held]))
+    data, basis = whiten(columns, angles, covariances, DOF), free_of_offsets()
+    x, y, c = basis.T @ np.vstack(columns), basis.T @ np.concatenate(angles), basis.T @ block_diag(*covariances) @ basis
+    across = x[:, held] * scale[held] ** 2
+    joint = np.block([[c + (x * scale**2) @ x.T, across], [across.T, np.diag(scale[held] ** 2)]])
+
+    def both(values):
+        moments = data.moments.holding(values, held, scale)
+        return multivariate_t.logpdf(np.r_[y, values[held]], None, joint, DOF), moments.log_marginal(scale[~held])
+
+    some, other = (np.linspace(a, b, WEIGHTS) for a, b in ((-1.0, 2.0), (0.4, -0.7)))
+    dense, found = np.subtract(both(some), both(other))
+    assert found == pytest.approx(dense) and abs(found) > 1.0

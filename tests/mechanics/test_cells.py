@@ -203,7 +203,7 @@ def test_states_bound_the_neutral_one(name):
         assert np.any(lower < upper - 1e-3), "a free initial state must make a difference"
 
 
-@pytest.mark.parametrize("name", ["elastic", "friction", "clearance"])
+@pytest.mark.parametrize("name", CELLS)
 @pytest.mark.parametrize("state", START)
 def test_thresholds_that_grow_alike_all_along_are_wider_ones(name, state):
     """Cells that rest are passed over many segments at a time."""
