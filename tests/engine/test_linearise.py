@@ -251,7 +251,7 @@ def test_an_offset_of_a_fifth_of_the_range_is_a_start():
 
 def test_a_wave_has_modes_with_and_without_it():
     waved = linearise(reduce_unit(UNITS["encoder_error"]()), library_terms())
-    assert len(waved) == 3 and all("wave" not in m.design.names for m in waved)
+    assert len(waved) >= 3 and all("wave" not in m.design.names for m in waved)
     assert all(abs(m.distortion.offset) < 2e-3 for m in waved)
 
 
