@@ -34,7 +34,9 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
     others = _apart([Distortion(), *starts], free.reduced.context)[1:]
     if len(others) > 1:
         others = [max(others, key=lambda start: free.learn(start, TRIAL_STEPS).log_marginal)]
-    ends = [free.find_mode(like, like.distortion) for like in map(free.learn, [Distortion(), *others])]
+    learnt = [(begin, free.learn(begin)) for begin in (Distortion(), *others)]
+    # Learning takes steps downhill as well: the mode may be nearer to where it began.
+    ends = [free.find_mode(like, at) for begin, like in learnt for at in (begin, like.distortion)]
     joint = max(ends, key=lambda ended: ended.log_marginal)
     waves: tuple[Group, ...] = ()
     wandering, gain = learn_wander(joint)

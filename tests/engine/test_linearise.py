@@ -166,7 +166,7 @@ def test_compressing_a_unit_changes_no_log_marginal_likelihood(clean):
     for step in (0.0, *rng.uniform(-1.0, ABOVE, (6, 1))):
         log_scale = at + step * scales.free
         away.append(clean.data.log_marginal(scales.of_weights(log_scale)) - small.log_marginal(np.exp(log_scale)[basis.group]))
-    assert np.ptp(away) < 0.01 and np.abs(away).max() < 0.05
+    assert np.ptp(away) < 0.02 and np.abs(away).max() < 0.05
 
 
 def test_the_log_marginal_likelihood_of_a_unit_is_dense_algebra(clean):
