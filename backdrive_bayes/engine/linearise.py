@@ -101,14 +101,14 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
 
 def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
     """The same where thresholds follow the amplitude alone, as nearly as that makes them grow as much."""
-    along, context = grown_histories(joint.reduced, reach), joint.reduced.context
-    law = np.array([context.law(0.0, history.log_amplitude)[2:] for history, _ in along])
+    along = grown_histories(joint.reduced, reach)
+    amplitude = np.array([history.log_amplitude for history, _ in along])
     growth = np.array([[np.mean(g) for g in grown] for _, grown in along])
-    if np.ptp(law[:, 0]) < LEAST_RANGE:
+    apart = amplitude - amplitude.mean()
+    if np.abs(apart).max() < LEAST_RANGE:
         return reach
-    (friction, drag), (friction_bend, drag_bend) = np.linalg.lstsq(law, growth - growth.mean(axis=0), rcond=None)[0].tolist()
-    lines = {"friction_amplitude": friction, "drag_amplitude": drag}
-    return replace(reach, **lines, friction_amplitude_bend=friction_bend, drag_amplitude_bend=drag_bend)
+    friction, drag = apart @ growth / (apart @ apart)
+    return replace(reach, friction_amplitude=float(friction), drag_amplitude=float(drag))
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:
