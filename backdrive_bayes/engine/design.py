@@ -161,6 +161,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, weights, effect
 
 def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
     """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion."""
+
     def laws(along):
         rates = zip(reduced.context.log_rate, along, strict=True)
         return [reduced.context.law(rate + history.surge, history.log_amplitude) for rate, history in rates]

@@ -26,7 +26,7 @@ BENT = 2.0
 
 
 def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tuple[Group, ...], float]:
-    """The mode of a search where every effect may act, and the encoder's wave with its frequency if it has one.
+    """The mode of a search where every effect may act, the encoder's wave if it has one, and the frequency of the clearest.
 
     It is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside the clearest
     wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
@@ -82,6 +82,9 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         own = replace(free, reduced=joint.reduced, fixed=fixed, only=some)
         return own.find_mode(joint, _only(reach if LAW in some else lawless, some))
 
+    def possible(linear: Linear) -> bool:
+        return WAVE not in linear.design.names or rises(linear, frequency)
+
     apart: dict[tuple[str, ...], Linear] = {}
     if LAW not in bent and any(term.name in joint.design.names for term in all_effects()[LAW]):
         # A creep may stand for all of it.
@@ -89,14 +92,13 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent
     if bent:
         apart |= {some: apart.get(some) or mode(some) for some in ((), *((name,) for name in bent))}
-        bent = tuple(name for name in bent if name != WAVE or rises(apart[(WAVE,)], frequency))
+        bent = tuple(name for name in bent if possible(apart[(name,)]))
         # Of two that act together each alone is likelier than nothing; beside a law of the rate no creep acted.
         least = apart[()].log_marginal
         likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
-    found = [linear for some, linear in apart.items() if set(some) <= set(bent)]
-    possible = [linear for linear in found if WAVE not in linear.design.names or rises(linear, frequency)]
-    return tuple(linear.without(WAVE) for linear in (joint, *possible))
+    found = [linear for some, linear in apart.items() if set(some) <= set(bent) and possible(linear)]
+    return tuple(linear.without(WAVE) for linear in (joint, *found))
 
 
 def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:

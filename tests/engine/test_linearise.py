@@ -166,7 +166,7 @@ def test_compressing_a_unit_changes_no_log_marginal_likelihood(clean):
     for step in (0.0, *rng.uniform(-1.0, ABOVE, (6, 1))):
         log_scale = at + step * scales.free
         away.append(clean.data.log_marginal(scales.of_weights(log_scale)) - small.log_marginal(np.exp(log_scale)[basis.group]))
-    assert np.ptp(away) < 0.02 and np.abs(away).max() < 0.05
+    assert np.ptp(away) < 0.01 and np.abs(away).max() < 0.05
 
 
 def test_the_log_marginal_likelihood_of_a_unit_is_dense_algebra(clean):
@@ -251,7 +251,7 @@ def test_an_offset_of_a_fifth_of_the_range_is_a_start():
 
 def test_a_wave_has_modes_with_and_without_it():
     waved = linearise(reduce_unit(UNITS["encoder_error"]()), library_terms())
-    assert len(waved) >= 3 and all("wave" not in m.design.names for m in waved)
+    assert len(waved) == 3 and all("wave" not in m.design.names for m in waved)
     assert all(abs(m.distortion.offset) < 2e-3 for m in waved)
 
 
