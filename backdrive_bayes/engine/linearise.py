@@ -43,9 +43,7 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
     clear, frequency = clearest_wave(joint)
     if clear > 0:
         wave = periodic_group(joint, frequency)
-        # A class that was learnt without the wave has spent itself on it.
-        beside = replace(free, fixed=(*free.fixed, wave))
-        waved = beside.find_mode(beside.learn(joint.distortion), joint.distortion)
+        waved = _anew(replace(free, fixed=(*free.fixed, wave)), joint.distortion)
         # Of a large wave, what the encoder reads is not the angle at which it errs.
         turned = periodic_group(waved, frequency)
         nearer = replace(free, fixed=(*free.fixed, turned)).find_mode(waved, waved.distortion)
@@ -55,9 +53,14 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
         if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain and rises(waved, frequency):
             joint, waves, wandering, gain = waved, (wave,), steady, more
     if gain > 0:
-        again = replace(free, reduced=wandering, fixed=(*free.fixed, *waves))
-        joint = again.find_mode(joint, joint.distortion)
+        joint = _anew(replace(free, reduced=wandering, fixed=(*free.fixed, *waves)), joint.distortion)
     return joint, waves, frequency
+
+
+def _anew(search: Search, distortion: Distortion) -> Linear:
+    """The mode reached from a distortion of a class that is learnt anew: one that was learnt without a wave or a wander of the
+    reading has spent itself on it."""
+    return search.find_mode(search.learn(distortion), distortion)
 
 
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:

@@ -133,7 +133,7 @@ class Basis:
     rest_group: np.ndarray
 
 
-SEEN = 0.05
+SEEN = 0.04
 """Share of the noise below which a direction of the weights is not seen by the data: it moves log marginal
 likelihoods by 1e-3."""
 ABOVE = 1.5

@@ -51,7 +51,7 @@ def test_what_breaks_a_symmetry_has_evidence_that_a_clean_unit_has_not(name):
     assert there.log_factor[(name,)] > 15 and clean.log_factor[(name,)] < 3
     assert max(clean.log_factor.values()) < 4
     # A wander of the reading explains a part of a single step.
-    assert there.left[()] > clean.left[()] + (0.25 if name == "unknown" else 1)
+    assert there.left[()] > clean.left[()] + (0.3 if name == "unknown" else 1)
 
 
 @pytest.mark.parametrize("name", [n for n in VARIANTS if n != "teeth_back"])
