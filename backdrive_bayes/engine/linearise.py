@@ -20,7 +20,6 @@ from backdrive_bayes.mechanics.history import LEAST_RANGE
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.mechanics.registry import all_effects
 
-TRIAL_STEPS = 2
 BENT = 2.0
 """Torque, in its noise, by which a distortion moves the prediction no longer along a straight line."""
 
@@ -29,21 +28,19 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
     """The mode of a search where every effect may act, the encoder's wave if it has one, and the frequency of the clearest.
 
     It is the higher of the ends of two searches, from an undistorted bench and from the best other start, and beside the clearest
-    wave of what is left there, if that is higher still, each with the wander of the reading that it leaves.
+    wave of what is left there, if that is higher still, each with the wander of the reading that it leaves. The class is learnt
+    anew beside a wave or a wander: without, it has spent itself on them.
     """
-    others = _apart([Distortion(), *starts], free.reduced.context)[1:]
-    if len(others) > 1:
-        others = [max(others, key=lambda start: free.learn(start, TRIAL_STEPS).log_marginal)]
-    learnt = [(begin, free.learn(begin)) for begin in (Distortion(), *others)]
-    # Learning takes steps downhill as well: the mode may be nearer to where it began.
-    ends = [free.find_mode(like, at) for begin, like in learnt for at in (begin, like.distortion)]
-    joint = max(ends, key=lambda ended: ended.log_marginal)
+    begun = [free.first(start) for start in _apart([Distortion(), *starts], free.reduced.context)]
+    likeliest = [begun[0], *sorted(begun[1:], key=lambda first: -first.log_marginal)[:1]]
+    modes = sorted((free.find_mode(first, first.distortion) for first in likeliest), key=lambda mode: -mode.log_marginal)
+    joint = free.learn(*_apart([mode.distortion for mode in modes], free.reduced.context))
     waves: tuple[Group, ...] = ()
     wandering, gain = learn_wander(joint)
     clear, frequency = clearest_wave(joint)
     if clear > 0:
         wave = periodic_group(joint, frequency)
-        waved = _anew(replace(free, fixed=(*free.fixed, wave)), joint.distortion)
+        waved = replace(free, fixed=(*free.fixed, wave)).learn(joint.distortion)
         # Of a large wave, what the encoder reads is not the angle at which it errs.
         turned = periodic_group(waved, frequency)
         nearer = replace(free, fixed=(*free.fixed, turned)).find_mode(waved, waved.distortion)
@@ -53,14 +50,8 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
         if waved.log_marginal + more + log_prior(frequency) > joint.log_marginal + gain and rises(waved, frequency):
             joint, waves, wandering, gain = waved, (wave,), steady, more
     if gain > 0:
-        joint = _anew(replace(free, reduced=wandering, fixed=(*free.fixed, *waves)), joint.distortion)
+        joint = replace(free, reduced=wandering, fixed=(*free.fixed, *waves)).learn(joint.distortion)
     return joint, waves, frequency
-
-
-def _anew(search: Search, distortion: Distortion) -> Linear:
-    """The mode reached from a distortion of a class that is learnt anew: one that was learnt without a wave or a wander of the
-    reading has spent itself on it."""
-    return search.find_mode(search.learn(distortion), distortion)
 
 
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
@@ -106,14 +97,14 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
 
 def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
     """The same where thresholds follow the amplitude alone, as nearly as that makes them grow as much."""
-    along = grown_histories(joint.reduced, reach)
-    amplitude = np.array([history.log_amplitude for history, _ in along])
+    along, context = grown_histories(joint.reduced, reach), joint.reduced.context
+    law = np.array([context.law(0.0, history.log_amplitude)[2:] for history, _ in along])
     growth = np.array([[np.mean(g) for g in grown] for _, grown in along])
-    apart = amplitude - amplitude.mean()
-    if np.abs(apart).max() < LEAST_RANGE:
+    if np.ptp(law[:, 0]) < LEAST_RANGE:
         return reach
-    friction, drag = apart @ growth / (apart @ apart)
-    return replace(reach, friction_amplitude=float(friction), drag_amplitude=float(drag))
+    (friction, drag), (friction_bend, drag_bend) = np.linalg.lstsq(law, growth - growth.mean(axis=0), rcond=None)[0].tolist()
+    lines = {"friction_amplitude": friction, "drag_amplitude": drag}
+    return replace(reach, **lines, friction_amplitude_bend=friction_bend, drag_amplitude_bend=drag_bend)
 
 
 def _bent(joint: Linear, reach: Distortion) -> tuple[str, ...]:

@@ -23,16 +23,14 @@ KNOTS, MOST_KNOTS = 60, 140
 """Knots of clearance and free play at first, and refined."""
 MOST_BEARINGS, CLOSEST = 5, 0.008
 """Bearings with thresholds of their own at most, and the least distance of these."""
-FIRST_FLANK, MOST_FLANKS = 2, 3
-"""Step from which on flanks are selected, before the jitter is learnt, which would absorb their residual, and the largest number
-of them: each adds some 25 weights."""
+MOST_FLANKS = 3
+"""Flanks at most: each adds some 25 weights. They are selected before the jitter is learnt, which would absorb their residual."""
 LEAST_APART = 0.3
 """Least distance of knots in the torque noise of a sample."""
 CONSPICUOUS = 3.5
 """Whitened residual beyond which the knots near a block are refined."""
-REFINEMENTS = 3
 LEARNINGS = 4
-"""How often the jitter is learnt at most: a prediction made with too little of it hides most of it."""
+"""How often the class is refined and the jitter learnt at most: a prediction made with too little jitter hides most of it."""
 STEPS = 14
 LONGEST_STEP, STILL = 2e-3, 1e-4
 """Longest step of a distortion, in shares of the torque, exponents fifty times as much, and one so short that the search ends."""
@@ -67,42 +65,50 @@ class Search:
         """The search where every effect may act; what follows from the torque history is made once."""
         return cls(reduced, effects, modules, tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)))
 
-    def learn(self, distortion: Distortion, steps: int = STEPS) -> Linear:
-        """The linear model after at most so many Gauss-Newton steps from a distortion; class, jitter and noise are learnt on the
-        way."""
-        reduced, context = self.reduced, self.reduced.context
-        jitter = Jitter(USUAL_JITTER.torque * context.torque_noise, USUAL_JITTER.length)
-        learnings, covariances = LEARNINGS, reduced.covariances(reduced.read_slopes, jitter)
-        laid, weights, refined, selecting = None, None, 0, "friction" in self.modules
-        known: dict[str, float] = {}
-        ratios = np.empty(0)
-        idle: set[str] = set()
-        for step in range(steps):
-            if laid is None or (not refined and _far(laid, distortion, context)):
-                laid, reducer, weights = distortion, ReducerClass(self._knots(distortion), self.modules, ratios=ratios), None
-            linear = self._linear(reducer, distortion, covariances, known, jitter, idle, weights)
-            known = linear.log_scale
-            weights, before, idle = linear.weights, idle, idle | self._backward(linear)
-            moved = self._moved(linear)
-            still = idle == before and length(moved, distortion, context) < STILL
-            if learnings and (still or step >= 4):
-                found = learn_jitter(linear)
-                learnings, jitter = learnings - 1 if found != jitter else 0, found
-            covariances = reduced.covariances(reduced.slopes(linear.predicted), jitter)
-            finer = reducer
-            if step >= FIRST_FLANK and selecting and ratios.size < MOST_FLANKS:
-                ratios = select_flank(linear)
-                selecting = ratios.size > reducer.ratios.size
-                finer = replace(reducer, ratios=ratios)
-            elif (still or step >= 6) and refined < REFINEMENTS and step < steps - 3:
-                finer = _refined(linear)
-                refined += int(finer.richness > reducer.richness)
-            distortion = _towards(distortion, moved, min(1.0, LONGEST_STEP / max(length(moved, distortion, context), STILL)))
-            if finer.richness > reducer.richness:
-                reducer, weights = finer, None
-            elif still and step >= 2 and not learnings:
+    def learn(self, distortion: Distortion, *near: Distortion) -> Linear:
+        """The linear model about the highest mode that is reached from a distortion, or from those ``near``, with a class, jitter
+        and noise that are learnt there."""
+        first = self.first(distortion)
+        learnt = self._learnt(first)
+        return max((self.find_mode(learnt, at) for at in (distortion, *near)), key=lambda mode: mode.log_marginal)
+
+    def first(self, distortion: Distortion) -> Linear:
+        """The linear model about a distortion with the class, jitter and noise that every unit begins with."""
+        reduced, usual = self.reduced, USUAL_JITTER
+        jitter = Jitter(usual.torque * reduced.context.torque_noise, usual.length)
+        reducer = ReducerClass(self._knots(distortion), self.modules)
+        linear = self._linear(reducer, distortion, reduced.covariances(reduced.read_slopes, jitter), {}, jitter, set())
+        return self._anew(linear)
+
+    def _learnt(self, linear: Linear) -> Linear:
+        """The same about the same distortion with flanks, jitter, knots and bearings that the residuals want."""
+        while "friction" in self.modules and linear.reducer.ratios.size < MOST_FLANKS:
+            ratios = select_flank(linear)
+            if ratios.size == linear.reducer.ratios.size:
+                break
+            linear = self._anew(linear, reducer=replace(linear.reducer, ratios=ratios))
+        # A step may be one of the loop, or torque that was not read: what is likelier decides.
+        fine = self._refined(linear, learning=False)
+        ends = [self._refined(one) for one in ((linear, fine) if fine is not linear else (linear,))]
+        return max(ends, key=lambda end: end.log_marginal)
+
+    def _refined(self, linear: Linear, learning: bool = True) -> Linear:
+        """The same with the knots and bearings that the residuals want, and with the jitter where it is ``learning``."""
+        for _ in range(LEARNINGS):
+            before, linear = linear, self._anew(linear, jitter=learn_jitter(linear)) if learning else linear
+            finer = _finer(linear)
+            if finer.richness > linear.reducer.richness:
+                linear = self._anew(linear, reducer=finer)
+            elif linear.jitter == before.jitter:
                 break
         return linear
+
+    def _anew(self, linear: Linear, reducer: ReducerClass | None = None, jitter: Jitter | None = None) -> Linear:
+        """The linear model about the same distortion with another class or jitter, its noise by what was predicted."""
+        reducer, jitter, reduced = reducer or linear.reducer, jitter or linear.jitter, self.reduced
+        covariances = tuple(reduced.covariances(reduced.slopes(linear.predicted), jitter))
+        weights = linear.weights if reducer is linear.reducer else None
+        return self._linear(reducer, linear.distortion, covariances, linear.log_scale, jitter, self._backward(linear), weights)
 
     def find_mode(self, like: Linear, distortion: Distortion) -> Linear:
         """The linear model about the mode that is reached from a distortion, of the class and jitter of ``like``, and of its
@@ -176,7 +182,7 @@ class Search:
         for effect in (e for e in self.effects if e.name in traces):
             free = self._acts(effect) and effect.name not in idle
             level = effect.present(self.reduced.context) if free else traces[effect.name]
-            priors[effect.name] = (float(np.log(level)), WIDE if free else 0.0)
+            priors[effect.name] = (float(np.log(level)), WIDE if free and not effect.of_class else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)
         scales = design.scales(priors)
@@ -235,11 +241,7 @@ def _towards(distortion, moved, share: float) -> Distortion:
     return Distortion(**{n: v + share * (getattr(moved, n) - v) for n, v in vars(distortion).items()})
 
 
-def _far(laid, distortion, context) -> bool:
-    return length(laid, distortion, context) > LEAST_APART * context.torque_noise
-
-
-def _refined(linear) -> ReducerClass:
+def _finer(linear) -> ReducerClass:
     """The class with more knots and bearings where settled blocks leave a conspicuous residual, the worst first until there are
     MOST_KNOTS and MOST_BEARINGS: a step is crossed at a torque, a slip begins at a distance from the last turning point.
     """

@@ -38,9 +38,11 @@ class Context:
         return np.log(self.rate) - np.log(self.rate).mean()
 
     def law(self, log_rate, log_amplitude: float) -> tuple:
-        """What growths are multiplied by: an exponent and a bend of a law of the rate, each like ``log_rate``, and an exponent of
-        the amplitude; the records' mean is none."""
-        return log_rate, log_rate**2 - np.mean(self.log_rate**2), log_amplitude - float(np.log(self.amplitude).mean())
+        """What growths are multiplied by: exponent and bend of a law of the rate, each like ``log_rate``, and exponent and bend
+        of one of the amplitude; the records' mean is none."""
+        own = np.log(self.amplitude) - np.log(self.amplitude).mean()
+        apart = log_amplitude - float(np.log(self.amplitude).mean())
+        return log_rate, log_rate**2 - np.mean(self.log_rate**2), apart, apart**2 - float(np.mean(own**2))
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,8 @@ class TangentEffect(Effect):
 class GrowthEffect(TangentEffect):
     """An effect by which the thresholds of one part follow the rate at the moment: the derivative by a term of the law.
 
-    ``part`` is the number of friction (0) or drag (1), ``term`` that of exponent (0), bend (1) or exponent of the amplitude (2).
+    ``part`` is the number of friction (0) or drag (1), ``term`` that of exponent (0) or bend (1) of the
+    rate, or of the amplitude (2 and 3).
     """
 
     part: int = 0
@@ -115,7 +118,7 @@ class Distortion:
     """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
 
     ``offset`` is a share of the torque scale, ``lag_s`` in seconds; the logarithms of friction and drag thresholds follow the log
-    of the rate with these exponents and bends, and that of the amplitude.
+    of the rate with these exponents and bends, and that of the amplitude likewise: a law of either has the same freedom.
     """
 
     offset: float = 0.0
@@ -126,13 +129,16 @@ class Distortion:
     drag_bend: float = 0.0
     friction_amplitude: float = 0.0
     drag_amplitude: float = 0.0
+    friction_amplitude_bend: float = 0.0
+    drag_amplitude_bend: float = 0.0
 
     def growth(self, log_rate, log_amplitude: float, context: Context) -> tuple:
         """Logarithms of the factors of friction and drag thresholds, each like ``log_rate``: one rate or many."""
-        line, bend, amplitude = context.law(log_rate, log_amplitude)
-        friction = self.friction_exponent * line + self.friction_bend * bend + self.friction_amplitude * amplitude
-        drag = self.drag_exponent * line + self.drag_bend * bend + self.drag_amplitude * amplitude
-        return _bounded(friction), _bounded(drag)
+        friction = self.friction_exponent, self.friction_bend, self.friction_amplitude, self.friction_amplitude_bend
+        drag = self.drag_exponent, self.drag_bend, self.drag_amplitude, self.drag_amplitude_bend
+        terms = context.law(log_rate, log_amplitude)
+        along, across = (sum(a * term for a, term in zip(law, terms, strict=True)) for law in (friction, drag))
+        return _bounded(along), _bounded(across)
 
 
 def _bounded(growth):

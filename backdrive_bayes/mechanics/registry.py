@@ -8,7 +8,12 @@ from importlib.metadata import entry_points
 from backdrive_bayes.mechanics.effect import Effect
 from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.effects.noncongruent_loops import DRAG_AMPLITUDE, FRICTION_AMPLITUDE
+from backdrive_bayes.mechanics.effects.noncongruent_loops import (
+    DRAG_AMPLITUDE,
+    DRAG_AMPLITUDE_BEND,
+    FRICTION_AMPLITUDE,
+    FRICTION_AMPLITUDE_BEND,
+)
 from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_BEND, DRAG_RATE, FRICTION_BEND, FRICTION_RATE
 from backdrive_bayes.mechanics.effects.sensor_lag import LAG_SPREAD, SENSOR_LAG
 from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
@@ -41,7 +46,7 @@ UNKNOWN = UNEXPLAINED
 """The process that stands for what no listed effect explains."""
 BENCH = (BENCH_HYSTERESIS,)
 """What every bench has at trace level and no diagnosis can name."""
-NONCONGRUENT = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE)
+NONCONGRUENT = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE, FRICTION_AMPLITUDE_BEND, DRAG_AMPLITUDE_BEND)
 """What every reducer has at trace level beside the operator: loops of other amplitudes are not quite congruent."""
 OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
 """Effects that lie inside the class: any fit holds them."""
