@@ -118,7 +118,7 @@ def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
     """With few knots to begin with, a steep clearance leaves a residual; refined, it does not."""
     monkeypatch.setattr(search, "KNOTS", 8)
     refined = mode(engagement=0.05)
-    monkeypatch.setattr(search, "REFINEMENTS", 0)
+    monkeypatch.setattr(search, "_finer", lambda linear: linear.reducer)
     coarse = mode(engagement=0.05)
     assert coarse.reducer.knots.size <= 10 + HALVINGS < refined.reducer.knots.size
     near, whole = (np.sum(np.abs(m.reducer.knots - 0.05) < 0.03) for m in (refined, coarse)), refined.reducer.knots.size
@@ -134,7 +134,7 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     worst[0][first] = 9.0
     monkeypatch.setattr(search, "MOST_KNOTS", clean.reducer.knots.size + 20)
     monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
-    refined = search._refined(clean)
+    refined = search._finer(clean)
     found, bearings = refined.knots, refined.bearings
     low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
     assert clean.reducer.knots.size < found.size <= search.MOST_KNOTS
@@ -279,13 +279,13 @@ def test_the_mode_is_reached_from_afar(searching, offset):
 
 
 def test_a_step_that_promises_too_much_is_shortened(searching, monkeypatch):
-    """Steps go three times as far as they should; where all are taken (planted fault), the mode is not found."""
+    """Steps go ten times as far as they lead; where all are taken (planted fault), the mode is not found."""
     free, like = searching
     right = search.Search._moved
 
     def moved(self, linear):
         there, here = right(self, linear), linear.distortion
-        return replace(here, offset=here.offset + 3.0 * (there.offset - here.offset))
+        return replace(here, offset=here.offset + 10.0 * (there.offset - here.offset))
 
     monkeypatch.setattr(search.Search, "_moved", moved)
     start = replace(like.distortion, offset=like.distortion.offset + 6e-4)
