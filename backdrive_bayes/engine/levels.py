@@ -25,10 +25,11 @@ def levels(linear: Linear, hypothesis: tuple[str, ...], off: tuple[str, ...] = (
     present, gone = ({t.name for n in names for t in all_effects().get(n, ())} for names in (hypothesis, off))
     traces = trace_levels(linear.reduced, linear.design, linear.effects)
     for effect in (e for e in linear.effects if e.name in traces):
-        on, trace = effect.name in present, traces[effect.name]
-        level = usual_level(effect, linear.reduced.context, trace) if on else trace
+        on, level = effect.name in present, traces[effect.name]
         if effect.of_class:
             level = effect.present(linear.reduced.context)
+        elif on:
+            level = usual_level(effect, linear.reduced.context, level)
         priors[effect.name] = OFF if effect.name in gone else (float(np.log(level)), PRESENT_SD if on else 0.0)
     for name in linear.design.names:
         priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))
