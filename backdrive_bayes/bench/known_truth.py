@@ -60,7 +60,8 @@ def physical_reducer(
         "free_play": np.zeros(steps.count),
         "compliance": np.zeros(1),
     }
-    return KnownReducer({n: w * np.exp(scatter * rng.standard_normal(w.size)) for n, w in weights.items()})
+    scattered = {n: w * np.exp(scatter * rng.standard_normal(w.size)) for n, w in weights.items()}
+    return KnownReducer(scattered | {"masing": np.zeros(reducer.part("masing").cells.count)})
 
 
 def random_reducer(rng, log_sd: float = 0.4) -> KnownReducer:

@@ -7,7 +7,7 @@ import numpy as np
 from backdrive_bayes.engine.design import Design, Group, grown_histories
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import Known, Moments
-from backdrive_bayes.mechanics.reducer import flank
+from backdrive_bayes.mechanics.reducer import FLANK_SCALE, flank
 
 RATIOS = np.arange(-0.9, 0.98, 0.06)
 """Ratios of the first grid: from flanks that release only beyond zero torque to flanks with next to no friction. A flank between
@@ -36,7 +36,7 @@ def _gains(linear: Linear, ratios: list[float]) -> list[float]:
     data, scale = linear.data, np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index]
     grown = grown_histories(linear.reduced, linear.distortion)
     groups = tuple(
-        Group("friction", tuple(cells.grown(growth[0]).means(history) @ mixing for history, growth in grown))
+        Group("flanks", tuple(cells.grown(growth[0]).means(history) @ mixing for history, growth in grown))
         for cells, mixing in map(flank, ratios)
     )
     rows = np.column_stack([data.x, linear.whitened(Design(groups)).x, data.y])
@@ -45,7 +45,7 @@ def _gains(linear: Linear, ratios: list[float]) -> list[float]:
 
     def log_marginal(columns) -> float:
         own = np.r_[columns, left.inner.shape[0] - 1].astype(int)
-        usual = np.full(own.size - 1, np.exp(linear.log_scale["friction"]))
+        usual = np.full(own.size - 1, np.exp(linear.log_scale.get("flanks", FLANK_SCALE[0])))
         return float(Moments(left.inner[np.ix_(own, own)], data.samples, data.noise_dof).log_marginal(usual))
 
     columns = np.split(np.arange(left.inner.shape[0] - 1), np.cumsum([g.width for g in groups])[:-1])

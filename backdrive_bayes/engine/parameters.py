@@ -8,15 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.mechanics.cells import Cells, join
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import ReducerClass
+from backdrive_bayes.mechanics.reducer import FRICTION, ReducerClass
 
 CROSSED_BELOW = 0.3
 """Clearance is what is crossed below this share of the largest torque; steps above it are stiffness that falls or slips."""
 NEAR_ZERO, NEAR_RATED = 0.15, 0.85
 """Compliances are secants of the settled loading branch up to the first, and from the second up to T_r."""
 SMALL_CENTRE = 0.28
-"""Friction torque is that of plays whose read-out lies below this share of the largest torque."""
+"""Friction torque is that of plays as far as they are read out below this share of the largest torque."""
 LEAST_SUM = 0.1
 """Share of the sum of magnitudes below which weights nearly cancel and weighted means mean nothing."""
 TINY = 1e-300
@@ -97,33 +98,47 @@ def _hardening(op: Operator) -> np.ndarray:
 
 
 def _compliance_zero(op: Operator) -> np.ndarray:
-    return op.loading_slope(("compliance", "elastic", "friction"), 0.0, NEAR_ZERO * op.end)
+    return op.loading_slope(("compliance", "elastic", *FRICTION), 0.0, NEAR_ZERO * op.end)
 
 
 def _compliance_rated(op: Operator) -> np.ndarray:
     # So far up every step is compliance: clearance is crossed below.
-    return op.loading_slope(("compliance", "elastic", "friction", "clearance", "free_play"), NEAR_RATED * op.end, op.end)
+    return op.loading_slope(("compliance", "elastic", *FRICTION, "clearance", "free_play"), NEAR_RATED * op.end, op.end)
 
 
-def _near(op: Operator) -> np.ndarray:
-    return op.reducer.part("friction").cells.centre < SMALL_CENTRE
+def _plays(op: Operator) -> tuple[Cells, np.ndarray]:
+    """Cells of all friction, and the angle that each contributes, (draws, cells)."""
+    own = [p for p in op.reducer.parts if p.name in FRICTION]
+    angle = np.concatenate([op.angles(p.name, slice(None)) for p in own], axis=1)
+    return join(*(p.cells for p in own)), angle
+
+
+def _near(op: Operator) -> tuple[np.ndarray, np.ndarray]:
+    """Thresholds of plays that are read out at small loads, (cells,), and the angle that each contributes there."""
+    cells, angle = _plays(op)
+    share = np.clip((SMALL_CENTRE - cells.centre) / _read_out(cells) + 0.5, 0.0, 1.0)
+    return cells.threshold[share > 0], (angle * share)[:, share > 0]
+
+
+def _read_out(cells: Cells) -> np.ndarray:
+    """Range of the load over which each play is read out, (cells,)."""
+    return 0.5 * (cells.width + cells.fall)
 
 
 def _friction_torque(op: Operator) -> np.ndarray:
-    near = _near(op)
-    return _moments(op.angles("friction", near), op.reducer.part("friction").cells.threshold[near])[0] * op.torque_scale_nm
+    threshold, angle = _near(op)
+    return _moments(angle, threshold)[0] * op.torque_scale_nm
 
 
 def _friction_spread(op: Operator) -> np.ndarray:
-    near = _near(op)
-    return _moments(op.angles("friction", near), np.log(op.reducer.part("friction").cells.threshold[near]))[1]
+    threshold, angle = _near(op)
+    return _moments(angle, np.log(threshold))[1]
 
 
 def _load_ratio(op: Operator) -> np.ndarray:
-    cells = op.reducer.part("friction").cells
-    angle = op.angles("friction", np.ones(cells.count, bool))
+    cells, angle = _plays(op)
     centre, threshold = (v - _moments(angle, v)[0][:, None] for v in (cells.centre, cells.threshold))
-    square = angle * centre**2
+    square = angle * (centre**2 + _read_out(cells) ** 2 / 12.0)
     return np.sum(angle * centre * threshold, axis=1) / _safe_sum(square)
 
 

@@ -10,6 +10,7 @@ from backdrive_bayes.engine.parameters import posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators.loop import Loops, cut_loops, loop_grid, settled_history, settled_loops
+from backdrive_bayes.mechanics.reducer import FRICTION
 
 KEPT_A_CHAIN = 100
 """Draws of each chain that are used where many loops are wanted."""
@@ -40,7 +41,7 @@ CORE = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area
 RESPONSES = ("theta_L_rad", "W_L_J", "loop_area_J", "S_g_J", "S_f_J")
 MOVED = {
     "clearance_rad": ("clearance", "free_play"),
-    "compliance_rated_rad_per_Nm": ("compliance", "elastic", "friction"),
+    "compliance_rated_rad_per_Nm": ("compliance", "elastic", *FRICTION),
     "drag_torque_Nm": (),
     "friction_torque_Nm": (),
 }

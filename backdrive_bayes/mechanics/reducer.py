@@ -40,14 +40,17 @@ bend."""
 LEFT_OUT = 3e-4
 """Share of the prior standard deviation of that path's angle which principal components that are left out have together."""
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
-FLANK_SHARE, FLANK_ALIKE = 0.1, 0.3
-"""Prior standard deviation of a flank's compliance over that of all friction, and its correlation length over the root of the
-load. Both are guesses beside the scale of friction, which is learnt."""
+FLANK_ALIKE = 0.3
+"""Correlation length of a flank's compliance over the root of the load."""
+FLANK_SCALE = (float(np.log(0.01)), 1.5)
+"""Normal prior of the log scale of flanks; one scale is learnt for all of them."""
 FLANK_NODES = np.r_[np.linspace(0.0, 1.0, 26)[:-1] ** 1.5, TOP]
 """Torques between which the compliance of a flank is constant. A flank that releases beyond zero torque does so in the order in
 which it slipped, relays of a cell in the opposite one: the cells are narrow, most of all at small loads."""
-GROWING = ("friction", "clearance")
-"""Parts whose thresholds follow the rate and the amplitude."""
+FRICTION = ("masing", "friction", "flanks")
+"""Parts of friction: the same at every load, as the load wants it, in proportion to it."""
+GROWING = (FRICTION, ("clearance",))
+"""Parts whose thresholds follow the rate and the amplitude: of friction, and drags."""
 GROWTH_STEP = 2e-3
 """Step of the difference quotients by the growth of thresholds."""
 LARGEST_THRESHOLD, LARGEST_DRAG = 0.3, 0.15
@@ -102,8 +105,8 @@ class ReducerClass:
         unknown = [m for m in self.modules if m not in BASELINE]
         if unknown or "elastic" not in self.modules:
             raise BadInput("--baseline", f"modules out of {', '.join(BASELINE)}, elastic among them", ",".join(self.modules))
-        friction = _friction(tuple(self.bearings.tolist()), tuple(self.ratios.tolist()))
-        made = (_compliance(), _elastic(), friction, _clearance(self.knots), _free_play(self.knots))
+        friction = (_masing(tuple(self.bearings.tolist())), _friction(), *_flanks(tuple(self.ratios.tolist())))
+        made = (_compliance(), _elastic(), *friction, _clearance(self.knots), _free_play(self.knots))
         object.__setattr__(self, "parts", tuple(p for p in made if p.module in self.modules))
 
     @property
@@ -125,9 +128,13 @@ class ReducerClass:
     def grown(self, history: History, weights, growth, part: int, terms, ends: bool = False) -> list[np.ndarray]:
         """Derivatives of the block means (blocks,) with independent ``weights``, or at the segments' ends, by the growth of
         friction (0) or of drag (1) in the direction of each of ``terms``, one for all or (2, segments)."""
-        own = self.part(GROWING[part])
-        cells = (own.cells.grown(growth[part] + GROWTH_STEP * term) for term in (0.0, *terms))
-        here, *there = (_response(c, history, own.weights(weights[own.name]), ends) for c in cells)
+        own = [(p.cells, p.weights(weights[p.name])) for p in self.parts if p.name in GROWING[part]]
+
+        def response(term):
+            moved = (_response(cells.grown(growth[part] + GROWTH_STEP * term), history, w, ends) for cells, w in own)
+            return sum(moved, np.zeros(()))
+
+        here, *there = (response(term) for term in (0.0, *terms))
         return [(moved - here) / GROWTH_STEP for moved in there]
 
     def ends(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
@@ -146,7 +153,8 @@ class ReducerClass:
 
 
 def _cells(part, growth) -> Cells:
-    return part.cells.grown(growth[GROWING.index(part.name)]) if part.name in GROWING else part.cells
+    grown = [growth[k] for k, names in enumerate(GROWING) if part.name in names]
+    return part.cells.grown(grown[0]) if grown else part.cells
 
 
 def _response(cells, history, weights, ends, sign=1.0):
@@ -169,24 +177,38 @@ def _elastic() -> Part:
 
 
 @lru_cache(maxsize=8)
-def _friction(bearings: tuple[float, ...], ratios: tuple[float, ...]) -> Part:
-    whole = [plays(THRESHOLDS), *(plays((r,)) for r in bearings)]
-    flanks = [flank(ratio) for ratio in ratios]
-    mixing = block_diag(*(principal_components(*one) for one in whole), *(mixing for _, mixing in flanks))
-    return Part("friction", "friction", join(*(cells for cells, _ in (*whole, *flanks))), mixing, (float(np.log(0.1)), 1.5))
+def _masing(bearings: tuple[float, ...]) -> Part:
+    """Friction that is the same at every load, elements in parallel or in series that slip at torques of their own."""
+    made = [plays(THRESHOLDS, read_outs=(0.0, 1.0)), *(plays((r,), read_outs=(0.0, 1.0)) for r in bearings)]
+    mixing = block_diag(*(principal_components(*one) for one in made))
+    return Part("masing", "friction", join(*(cells for cells, _ in made)), mixing, (float(np.log(0.1)), 1.5))
 
 
-def plays(thresholds) -> tuple[Cells, np.ndarray]:
+@lru_cache(maxsize=1)
+def _friction() -> Part:
+    cells, root = plays(THRESHOLDS)
+    return Part("friction", "friction", cells, principal_components(cells, root), (float(np.log(0.1)), 1.5))
+
+
+@lru_cache(maxsize=8)
+def _flanks(ratios: tuple[float, ...]) -> tuple[Part, ...]:
+    if not ratios:
+        return ()
+    made = [flank(ratio) for ratio in ratios]
+    return (Part("flanks", "friction", join(*(c for c, _ in made)), block_diag(*(m for _, m in made)), FLANK_SCALE),)
+
+
+def plays(thresholds, read_outs=READ_OUTS) -> tuple[Cells, np.ndarray]:
     """Plays of some thresholds, or of a bearing by itself, and the root of the prior covariance of their weights."""
     share = np.gradient(np.log(thresholds)) / USUAL_SPACING if len(thresholds) > 1 else (1.0 - SHARED,)
     rows = []
     for r, part in zip(thresholds, share, strict=True):
-        for low, high in zip(READ_OUTS[:-1], READ_OUTS[1:], strict=True):
+        for low, high in itertools.pairwise(read_outs):
             if low + r < 1:
                 high = TOP - r if high + r >= 1 else high
                 rows.append((low + r, low - r, high - low, r, 0.5 * (low + high), part))
     up, down, width, threshold, centre, share = np.array(rows).T
-    level = _below(threshold, LARGEST_THRESHOLD)
+    level = _below(threshold, LARGEST_THRESHOLD) if len(read_outs) > 2 else np.ones(threshold.size)
     near = np.exp(-_apart(np.log(threshold)) / 0.7) * (0.5 + 0.5 * np.exp(-_apart(np.sqrt(centre)) / 0.3))
     one = threshold[:, None] == threshold
     # One bearing by itself may slip at any torque.
@@ -203,7 +225,7 @@ def flank(ratio: float) -> tuple[Cells, np.ndarray]:
     down = np.minimum(ratio * FLANK_NODES[1:], ratio * up)
     cells = Cells(up, down, width, np.full(width.size, 2.0), abs(ratio) * width)
     near = np.exp(-_apart(np.sqrt(up + 0.5 * width)) / FLANK_ALIKE)
-    return cells, principal_components(cells, FLANK_SHARE * np.linalg.cholesky(near))
+    return cells, principal_components(cells, np.linalg.cholesky(near))
 
 
 def principal_components(cells: Cells, root: np.ndarray) -> np.ndarray:

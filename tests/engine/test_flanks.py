@@ -23,7 +23,7 @@ def worm(known):
     """The reducer with a thread in series whose friction is in proportion to its load."""
     reducer = ReducerClass(known.reducer.knots, ratios=np.array([RATIO]))
     more = np.full(flank(RATIO)[0].count, COMPLIANCE)
-    return replace(known, reducer=reducer, weights=known.weights | {"friction": np.r_[known.weights["friction"], more]})
+    return replace(known, reducer=reducer, weights=known.weights | {"flanks": more})
 
 
 @pytest.fixture(scope="module")

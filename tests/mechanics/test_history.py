@@ -8,6 +8,7 @@ from support.planted import by_hand, smooth_reducer
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.mechanics import history as module
 from backdrive_bayes.mechanics.history import of_blocks, through
+from backdrive_bayes.mechanics.reducer import FRICTION
 from backdrive_bayes.records.reduction import Blocks
 
 SCALE, RATE = 0.1, 0.05
@@ -92,7 +93,7 @@ def test_thresholds_that_follow_the_rate_are_followed_where_it_bends(monkeypatch
             if cuts is not None:
                 patch.setattr(module, "_bends", lambda time_s, z: cuts)
             history = of_blocks(blocks, SCALE)
-        parts = (p.cells.grown(0.4 * history.surge) if p.name == "friction" else p.cells for p in known.reducer.parts)
+        parts = (p.cells.grown(0.4 * history.surge) if p.name in FRICTION else p.cells for p in known.reducer.parts)
         return sum(c.summed(history, known.weights[p.name]) for c, p in zip(parts, known.reducer.parts, strict=True))
 
     exact = angles(np.linspace(blocks.begin_s[0], blocks.end_s[-1], 50 * blocks.count.size))

@@ -9,6 +9,7 @@ from backdrive_bayes.mechanics.cells import Cells
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.reducer import (
     BASELINE,
+    FRICTION,
     THRESHOLDS,
     TOP,
     ReducerClass,
@@ -41,7 +42,7 @@ def test_columns_are_linear_in_the_cells():
 
 def test_the_prior_of_every_part_has_its_covariance_from_mixing():
     for part in REDUCER.parts:
-        if part.mixing is not None and part.name != "friction":
+        if part.mixing is not None and part.name not in FRICTION:
             assert np.linalg.eigvalsh(part.mixing @ part.mixing.T).min() > 0
             assert np.array_equal(part.mixing, np.tril(part.mixing))
 

@@ -13,7 +13,7 @@ from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.search import Search
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import BASELINE
+from backdrive_bayes.mechanics.reducer import BASELINE, FRICTION
 from backdrive_bayes.records.record import Record, Unit
 
 NOISE = BenchNoise()
@@ -78,7 +78,7 @@ def by_hand(exponent, known, seed=0, noise=NOISE) -> Unit:
         torque = np.interp(time, corner, nodes)
         history, angle = through(time, torque, SCALE), np.zeros(time.size)
         for part in known.reducer.parts:
-            cells = part.cells.grown(exponent * history.surge) if part.name == "friction" else part.cells
+            cells = part.cells.grown(exponent * history.surge) if part.name in FRICTION else part.cells
             angle[1:] += known.angle_scale_rad * cells.ends(history) @ known.weights[part.name]
         angle[0] = angle[1]
         angle += angle_noise(time.size, 1 / HERTZ, noise, rng)
@@ -152,7 +152,7 @@ def joint_mode(reduced, effects):
 
 def _firmer(known, factor):
     """The reducer with other thresholds of friction."""
-    parts = (replace(p, cells=p.cells.wider(factor)) if p.name == "friction" else p for p in known.reducer.parts)
+    parts = (replace(p, cells=p.cells.wider(factor)) if p.name in FRICTION else p for p in known.reducer.parts)
     reducer = copy(known.reducer)
     object.__setattr__(reducer, "parts", tuple(parts))
     return replace(known, reducer=reducer)
