@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial.hermite import hermgauss
+from scipy.special import logsumexp
 
 from backdrive_bayes.engine.design import Design, Group, grown_histories
 from backdrive_bayes.engine.linear import Linear
@@ -14,6 +16,9 @@ RATIOS = np.arange(-0.9, 0.98, 0.06)
 two of them raises the marginal likelihood of both."""
 REFINEMENTS = 3
 """How often the grid is halved about the best ratio, to a distance below one hundredth."""
+NODES, WEIGHTS = hermgauss(5)
+SCALES, WEIGHTS = np.exp(FLANK_SCALE[0] + FLANK_SCALE[1] * np.sqrt(2.0) * NODES), WEIGHTS / WEIGHTS.sum()
+"""Scales of a flank and their shares of its prior: a scale of its own is not known before it is there."""
 PRICE = float(np.log(RATIOS.size))
 """Log prior odds against one ratio among those of the grid."""
 
@@ -43,10 +48,11 @@ def _gains(linear: Linear, ratios: list[float]) -> list[float]:
     joined = Moments(rows.T @ rows, data.samples, data.noise_dof)
     left = Known.of(joined, np.arange(rows.shape[1] - 1) < scale.size, scale).left
 
-    def log_marginal(columns) -> float:
+    def log_marginal(columns, scale: float = 1.0) -> float:
         own = np.r_[columns, left.inner.shape[0] - 1].astype(int)
-        usual = np.full(own.size - 1, np.exp(linear.log_scale.get("flanks", FLANK_SCALE[0])))
-        return float(Moments(left.inner[np.ix_(own, own)], data.samples, data.noise_dof).log_marginal(usual))
+        moments = Moments(left.inner[np.ix_(own, own)], data.samples, data.noise_dof)
+        return float(moments.log_marginal(np.full(own.size - 1, scale)))
 
     columns = np.split(np.arange(left.inner.shape[0] - 1), np.cumsum([g.width for g in groups])[:-1])
-    return [log_marginal(own) - log_marginal([]) for own in columns]
+    without = log_marginal([])
+    return [float(logsumexp([log_marginal(own, s) for s in SCALES], b=WEIGHTS)) - without for own in columns]

@@ -32,8 +32,10 @@ CONSPICUOUS = 3.5
 LEARNINGS = 4
 """How often the class is refined and the jitter learnt at most: a prediction made with too little jitter hides most of it."""
 STEPS = 14
-LONGEST_STEP, STILL = 2e-3, 1e-4
-"""Longest step of a distortion, in shares of the torque, exponents fifty times as much, and one so short that the search ends."""
+LONGEST_STEP = 2e-3
+"""Longest step of a distortion, in shares of the torque, exponents fifty times as much."""
+STILL = 0.05
+"""Rise of the log density, as a straight line promises it, below which the search ends."""
 SHORTER, MOST_LENGTHENED = 0.25, 8.0
 """Share to which a step that does not rise is shortened, and by how much one may be lengthened while they rise."""
 LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"
@@ -129,23 +131,24 @@ class Search:
                 best = about(best.distortion, best.log_scale)
             moved = self._moved(best)
             apart = length(moved, best.distortion, context)
-            if share * apart < STILL:
+            here = self._log_density(best, best.log_scale)
+            if share * (self._log_density(best, best.log_scale, moved) - here) < STILL:
                 break
             tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best.log_scale)
-            if self._log_density(tried, best.log_scale) < self._log_density(best, best.log_scale):
+            if self._log_density(tried, best.log_scale) < here:
                 share *= SHORTER
             else:
                 best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
         return best
 
-    def _log_density(self, linear: Linear, log_scale) -> float:
-        """Log density of the data and a distortion at known log scales of its parameters, up to a constant."""
+    def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
+        """Log density of the data and a distortion, its own by default, at known log scales of its parameters, but for a constant."""
         names, index = linear.design.names, linear.design.index
         values, held = np.zeros(index.size), np.zeros(index.size, bool)
         scale = np.exp([linear.log_scale[n] for n in names])[index]
         for effect in (e for e in self.effects if isinstance(e, TangentEffect) and e.name in names):
             own = index == names.index(effect.name)
-            values[own], held[own] = getattr(linear.distortion, effect.parameter), True
+            values[own], held[own] = getattr(at or linear.distortion, effect.parameter), True
             scale[own] = np.exp(log_scale[effect.name])
         return float(linear.data.moments.holding(values, held, scale).log_marginal(scale[~held])) + linear.data.log_volume
 

@@ -225,14 +225,15 @@ def test_friction_that_follows_the_rate_at_the_moment_is_found_in_records_of_one
 
 
 def test_a_law_of_the_rate_is_told_from_one_of_the_amplitude_by_two_rates_of_one_amplitude():
-    """Where the small loop is the fast one, friction may follow either (planted fault)."""
+    """Where the small loop is the fast one, friction may follow either (planted fault): a law of the amplitude that would do
+    instead is rare."""
 
     def factor(*loops, seed=0):
-        unit = planted(seed, known=_rough_reducer(4.0), exponent=0.4, loops=loops)
+        unit = planted(seed, known=_rough_reducer(4.0), exponent=0.2, loops=loops)
         return weigh(linearise(reduce_unit(unit), library_terms())).log_factor[(LAW,)]
 
     confounded = [factor((0.1, 0.02), (0.05, 0.1), seed=seed) for seed in range(3)]
-    assert np.median(confounded) < 1.0 and max(confounded) < 10.0
+    assert np.median(confounded) < 6.0 and max(confounded) < 10.0
     assert factor((0.1, 0.02), (0.1, 0.1), (0.05, 0.1)) > 30.0
 
 
@@ -251,7 +252,10 @@ def test_an_offset_of_a_fifth_of_the_range_is_a_start():
 
 def test_a_wave_has_modes_with_and_without_it():
     waved = linearise(reduce_unit(UNITS["encoder_error"]()), library_terms())
-    assert len(waved) == 3 and all("wave" not in m.design.names for m in waved)
+    marginal = np.array([m.log_marginal for m in waved])
+    explained = marginal > marginal.max() - 30.0
+    assert explained[0] and not explained.all() and marginal[~explained].max() < marginal.max() - 200.0
+    assert all("wave" not in m.design.names for m in waved)
     assert all(abs(m.distortion.offset) < 2e-3 for m in waved)
 
 
@@ -281,16 +285,11 @@ def test_the_mode_is_reached_from_afar(searching, offset):
 def test_a_step_that_promises_too_much_is_shortened(searching, monkeypatch):
     """Steps go ten times as far as they lead; where all are taken (planted fault), the mode is not found."""
     free, like = searching
-    right = search.Search._moved
-
-    def moved(self, linear):
-        there, here = right(self, linear), linear.distortion
-        return replace(here, offset=here.offset + 10.0 * (there.offset - here.offset))
-
-    monkeypatch.setattr(search.Search, "_moved", moved)
+    right = search._towards
+    monkeypatch.setattr(search, "_towards", lambda here, there, share: right(here, there, 10.0 * share))
     start = replace(like.distortion, offset=like.distortion.offset + 6e-4)
     assert free.find_mode(like, start).distortion.offset == pytest.approx(-3e-4 / SCALE, abs=3e-4)
-    monkeypatch.setattr(search.Search, "_log_density", lambda *_: 0.0)
+    monkeypatch.setattr(search.Search, "_log_density", lambda self, linear, scale, at=None: float(at is not None))
     assert free.find_mode(like, start).distortion.offset != pytest.approx(-3e-4 / SCALE, abs=3e-4)
 
 
