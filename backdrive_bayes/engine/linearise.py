@@ -23,6 +23,9 @@ from backdrive_bayes.mechanics.registry import all_effects
 BENT = 2.0
 """Torque, in its noise, by which a distortion moves the prediction no longer along a straight line."""
 
+COLLINEAR = 1e-6
+"""Share of the line of a law below which its bend is nothing: two amplitudes tell of no bend."""
+
 
 def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tuple[Group, ...], float]:
     """The mode of a search where every effect may act, the encoder's wave if it has one, and the frequency of the clearest.
@@ -102,7 +105,7 @@ def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
     growth = np.array([[np.mean(g) for g in grown] for _, grown in along])
     if np.ptp(law[:, 0]) < LEAST_RANGE:
         return reach
-    (friction, drag), (friction_bend, drag_bend) = np.linalg.lstsq(law, growth - growth.mean(axis=0), rcond=None)[0].tolist()
+    (friction, drag), (friction_bend, drag_bend) = np.linalg.lstsq(law, growth - growth.mean(axis=0), rcond=COLLINEAR)[0].tolist()
     lines = {"friction_amplitude": friction, "drag_amplitude": drag}
     return replace(reach, **lines, friction_amplitude_bend=friction_bend, drag_amplitude_bend=drag_bend)
 

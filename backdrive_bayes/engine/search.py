@@ -142,7 +142,7 @@ class Search:
         return best
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
-        """Log density of the data and a distortion, its own by default, at known log scales of its parameters, but for a constant."""
+        """Log density of the data and a distortion, by default its own, at known log scales, up to a constant."""
         names, index = linear.design.names, linear.design.index
         values, held = np.zeros(index.size), np.zeros(index.size, bool)
         scale = np.exp([linear.log_scale[n] for n in names])[index]

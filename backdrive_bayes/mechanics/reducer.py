@@ -1,8 +1,8 @@
 """The class of clean reducers: odd, rate-independent hysteresis operators, linear in their weights.
 
-Five parts share the Preisach plane: a constant compliance, smooth elasticity beside it, friction (play operators over thresholds
-and read-outs, and flanks whose friction is in proportion to their load), clearance (relays that cross at +a and back at -a, each
-tooth at its own a) and free play (steps without drag).
+Seven parts share the Preisach plane: a constant compliance, smooth elasticity beside it, friction of three kinds (plays that are
+the same at every load; plays whose read-out changes with it; flanks, whose friction is in proportion to it), clearance (relays
+that cross at +a and back at -a, each tooth at its own a) and free play (steps without drag).
 Clearance and free play are refined where the loops are steep; together they hold any odd settled loop at the resolution of their
 knots.
 """
@@ -70,9 +70,8 @@ BASELINE = ("geometric", "elastic", "friction")
 class Part:
     """One part of the class: its cells, and ``mixing`` (cells, cells) that turns independent weights into the prior's.
 
-    ``log_scale`` is mean and standard deviation of the normal prior on the log standard deviation of the weights, in
-    shares of the
-    angle scale.
+    ``log_scale`` is mean and standard deviation of the normal prior on the log standard deviation of the weights, in shares of
+    the angle scale.
     """
 
     name: str
