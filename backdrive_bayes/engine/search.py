@@ -32,6 +32,8 @@ CONSPICUOUS = 3.5
 LEARNINGS = 4
 """How often the class is refined and the jitter learnt at most: a prediction made with too little jitter hides most of it."""
 STEPS = 14
+RISEN = 10.0
+"""Rise of the log marginal likelihood from where a class was learnt to its mode beyond which they lie apart."""
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque, exponents fifty times as much."""
 STILL = 0.05
@@ -69,10 +71,21 @@ class Search:
 
     def learn(self, distortion: Distortion, *near: Distortion) -> Linear:
         """The linear model about the highest mode that is reached from a distortion, or from those ``near``, with a class, jitter
-        and noise that are learnt there."""
-        first = self.first(distortion)
-        learnt = self._learnt(first)
-        return max((self.find_mode(learnt, at) for at in (distortion, *near)), key=lambda mode: mode.log_marginal)
+        and noise that are learnt there, and learnt anew where the mode lies apart from it."""
+        learnt, best = self._learnt_mode(distortion, *near)
+        for _ in range(LEARNINGS):
+            if best.log_marginal - learnt.log_marginal < RISEN:
+                break
+            learnt, mode = self._learnt_mode(best.distortion)
+            if mode.log_marginal <= best.log_marginal:
+                break
+            best = mode
+        return best
+
+    def _learnt_mode(self, distortion: Distortion, *near: Distortion) -> tuple[Linear, Linear]:
+        """The linear model about a distortion with what is learnt there, and that about its highest mode."""
+        learnt = self._learnt(self.first(distortion))
+        return learnt, max((self.find_mode(learnt, at) for at in (distortion, *near)), key=lambda mode: mode.log_marginal)
 
     def first(self, distortion: Distortion) -> Linear:
         """The linear model about a distortion with the class, jitter and noise that every unit begins with."""
@@ -95,15 +108,18 @@ class Search:
         return max(ends, key=lambda end: end.log_marginal)
 
     def _refined(self, linear: Linear, learning: bool = True) -> Linear:
-        """The same with the knots and bearings that the residuals want, and with the jitter where it is ``learning``."""
+        """The likeliest on the way to one with the knots and bearings that the residuals want, and with the jitter where it is
+        ``learning``."""
+        best = linear
         for _ in range(LEARNINGS):
             before, linear = linear, self._anew(linear, jitter=learn_jitter(linear)) if learning else linear
             finer = _finer(linear)
-            if finer.richness > linear.reducer.richness:
-                linear = self._anew(linear, reducer=finer)
-            elif linear.jitter == before.jitter:
+            refined = self._anew(linear, reducer=finer) if finer.richness > linear.reducer.richness else linear
+            best = max((best, linear, refined), key=lambda one: one.log_marginal)
+            if refined is linear and linear.jitter == before.jitter:
                 break
-        return linear
+            linear = refined
+        return best
 
     def _anew(self, linear: Linear, reducer: ReducerClass | None = None, jitter: Jitter | None = None) -> Linear:
         """The linear model about the same distortion with another class or jitter, its noise by what was predicted."""

@@ -16,7 +16,7 @@ from backdrive_bayes.mechanics.registry import library_terms
 RATIO, COMPLIANCE = 0.45, 0.5
 """The ratio lies halfway between two of the first grid."""
 SMALLER = (*LOOPS, (0.06, 0.05))
-QUIET = BenchNoise(white_rad=2e-6, correlated_rad=1e-6, torque_nm=2e-6)
+QUIET = BenchNoise(white_rad=1e-5, correlated_rad=5e-6, torque_nm=1e-5)
 
 
 def worm(known):
