@@ -32,8 +32,6 @@ CONSPICUOUS = 3.5
 LEARNINGS = 4
 """How often the class is refined and the jitter learnt at most: a prediction made with too little jitter hides most of it."""
 STEPS = 14
-RISEN = 10.0
-"""Rise of the log marginal likelihood from where a class was learnt to its mode beyond which they lie apart."""
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque, exponents fifty times as much."""
 STILL = 0.05
@@ -71,21 +69,9 @@ class Search:
 
     def learn(self, distortion: Distortion, *near: Distortion) -> Linear:
         """The linear model about the highest mode that is reached from a distortion, or from those ``near``, with a class, jitter
-        and noise that are learnt there, and learnt anew where the mode lies apart from it."""
-        learnt, best = self._learnt_mode(distortion, *near)
-        for _ in range(LEARNINGS):
-            if best.log_marginal - learnt.log_marginal < RISEN:
-                break
-            learnt, mode = self._learnt_mode(best.distortion)
-            if mode.log_marginal <= best.log_marginal:
-                break
-            best = mode
-        return best
-
-    def _learnt_mode(self, distortion: Distortion, *near: Distortion) -> tuple[Linear, Linear]:
-        """The linear model about a distortion with what is learnt there, and that about its highest mode."""
+        and noise that are learnt there."""
         learnt = self._learnt(self.first(distortion))
-        return learnt, max((self.find_mode(learnt, at) for at in (distortion, *near)), key=lambda mode: mode.log_marginal)
+        return max((self.find_mode(learnt, at) for at in (distortion, *near)), key=lambda mode: mode.log_marginal)
 
     def first(self, distortion: Distortion) -> Linear:
         """The linear model about a distortion with the class, jitter and noise that every unit begins with."""
