@@ -45,7 +45,7 @@ def test_a_step_in_one_record_lies_in_that_record():
     linear = prepare(stepped(8e-3))[0]
     cells, blocks = where.gap_map(linear, where.estimate_gap(linear, np.random.default_rng(0))), linear.reduced.blocks
     first = blocks[0].name
-    assert sum(c["share"] for c in cells if c["record"] == first) > 0.85
+    assert sum(c["share"] for c in cells if c["record"] == first) > 0.7
     assert any(c["credible"] for c in cells)
     assert first in where.summary(cells, {b.name: 0.1 for b in blocks})
 
