@@ -8,7 +8,8 @@ import numpy as np
 
 from backdrive_bayes.bench.draws import first_order
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
+from backdrive_bayes.mechanics.part import TOP
+from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.records.record import Record, Unit
 
 KNOTS = np.r_[0.0, np.geomspace(0.004, TOP, 80)]

@@ -47,6 +47,12 @@ class Group:
         rows = self.columns[record].shape[0]
         return np.hstack([c if r == record else np.zeros((rows, c.shape[1])) for r, c in enumerate(self.columns)])
 
+    def by_record(self) -> tuple[Group, ...]:
+        """One group for the own weights of each record, by name and number."""
+        records = range(len(self.columns))
+        parts = (tuple(c if k == r else c[:, :0] for k, c in enumerate(self.columns)) for r in records)
+        return tuple(Group(f"{self.name}_{r}", part, own=True) for r, part in zip(records, parts, strict=True))
+
 
 @dataclass(frozen=True, eq=False)
 class Design:

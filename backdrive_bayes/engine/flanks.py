@@ -9,7 +9,7 @@ from scipy.special import logsumexp
 from backdrive_bayes.engine.design import Design, Group, grown_histories
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import Known, Moments
-from backdrive_bayes.mechanics.reducer import FLANK_SCALE, flank
+from backdrive_bayes.mechanics.friction import FLANK_SCALE, flank
 
 RATIOS = np.arange(-0.9, 0.98, 0.06)
 """Ratios of the first grid: from flanks that release only beyond zero torque to flanks with next to no friction. A flank between

@@ -9,8 +9,9 @@ import numpy as np
 
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.mechanics.cells import Cells, join
+from backdrive_bayes.mechanics.friction import FRICTION
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import FRICTION, ReducerClass
+from backdrive_bayes.mechanics.reducer import ReducerClass
 
 CROSSED_BELOW = 0.3
 """Clearance is what is crossed below this share of the largest torque; steps above it are stiffness that falls or slips."""

@@ -121,7 +121,6 @@ def _constant(posterior: Posterior) -> dict:
     out["duration_s"] = (("record",), posterior.context.duration_s)
     out["relative_amplitude"] = (("record",), posterior.context.amplitude)
     out["knots"] = (("knot",), posterior.reducer.knots)
-    out["bearings"] = (("bearing",), posterior.reducer.bearings)
     out["flank_ratios"] = (("flank",), posterior.reducer.ratios)
     return out | {name: (("diagnosed",), getattr(found, name)) for name in ("rhat", "bulk_ess", "tail_ess")}
 

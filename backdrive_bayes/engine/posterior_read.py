@@ -45,7 +45,6 @@ def _rebuilt(groups) -> Posterior:
         reducer=ReducerClass(
             constant["knots"].values,
             tuple(str(about["modules"]).split(",")),
-            constant["bearings"].values,
             constant["flank_ratios"].values,
         ),
         distortion=Distortion(**json.loads(about["distortion"])),

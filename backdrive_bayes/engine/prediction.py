@@ -9,7 +9,7 @@ from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.predictive import block_offsets
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import TOP
+from backdrive_bayes.mechanics.part import TOP
 
 MOST_NODES = 20_000
 """Samples at which the class is evaluated; between them, on one monotone run, curves are straight."""

@@ -14,15 +14,15 @@ from backdrive_bayes.engine.marginal import find_scales, whiten
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.traces import trace_levels
+from backdrive_bayes.mechanics.clearance import place_knots, spaced
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.reducer import THRESHOLDS, TOP, ReducerClass, place_knots, spaced
+from backdrive_bayes.mechanics.part import TOP
+from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.mechanics.registry import all_effects
 
 KNOTS, MOST_KNOTS = 60, 140
 """Knots of clearance and free play at first, and refined."""
-MOST_BEARINGS, CLOSEST = 5, 0.008
-"""Bearings with thresholds of their own at most, and the least distance of these."""
 MOST_FLANKS = 3
 """Flanks at most: each adds some 25 weights. They are selected before the jitter is learnt, which would absorb their residual."""
 LEAST_APART = 0.3
@@ -82,7 +82,7 @@ class Search:
         return self._anew(linear)
 
     def _learnt(self, linear: Linear) -> Linear:
-        """The same about the same distortion with flanks, jitter, knots and bearings that the residuals want."""
+        """The same about the same distortion with flanks, jitter and knots that the residuals want."""
         while "friction" in self.modules and linear.reducer.ratios.size < MOST_FLANKS:
             ratios = select_flank(linear)
             if ratios.size == linear.reducer.ratios.size:
@@ -94,13 +94,12 @@ class Search:
         return max(ends, key=lambda end: end.log_marginal)
 
     def _refined(self, linear: Linear, learning: bool = True) -> Linear:
-        """The likeliest on the way to one with the knots and bearings that the residuals want, and with the jitter where it is
-        ``learning``."""
+        """The likeliest on the way to one with the knots that the residuals want, and the jitter where it is ``learning``."""
         best = linear
         for _ in range(LEARNINGS):
             before, linear = linear, self._anew(linear, jitter=learn_jitter(linear)) if learning else linear
             finer = _finer(linear)
-            refined = self._anew(linear, reducer=finer) if finer.richness > linear.reducer.richness else linear
+            refined = self._anew(linear, reducer=finer) if finer.knots.size > linear.reducer.knots.size else linear
             best = max((best, linear, refined), key=lambda one: one.log_marginal)
             if refined is linear and linear.jitter == before.jitter:
                 break
@@ -247,25 +246,17 @@ def _towards(distortion, moved, share: float) -> Distortion:
 
 
 def _finer(linear) -> ReducerClass:
-    """The class with more knots and bearings where settled blocks leave a conspicuous residual, the worst first until there are
-    MOST_KNOTS and MOST_BEARINGS: a step is crossed at a torque, a slip begins at a distance from the last turning point.
-    """
-    reduced, wanted = linear.reduced, []
-    knots, bearings = linear.reducer.knots, linear.reducer.bearings
+    """The class with more knots where settled blocks leave a conspicuous residual, the worst first until there are MOST_KNOTS."""
+    reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
     for blocks, white, settled in zip(reduced.blocks, linear.residuals(), reduced.settled, strict=True):
         low, high = blocks.edges_nm() / reduced.torque_scale_nm
-        turn = blocks.turning_nm[blocks.leg] / reduced.torque_scale_nm
         for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & settled).tolist():
             about = range(max(i - 1, 0), min(i + 2, white.size))
-            torques = np.concatenate([np.linspace(low[j], high[j], 5) for j in about])
-            wanted.append((abs(white[i]), torques, 0.5 * np.abs(torques - turn[i])))
+            wanted.append((abs(white[i]), np.concatenate([np.linspace(low[j], high[j], 5) for j in about])))
     wanted.sort(key=lambda found: -found[0])
     least = 0.8 * LEAST_APART * reduced.context.torque_noise
-    for _, torques, slips in wanted:
+    for _, torques in wanted:
         inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
         finer = spaced(np.r_[inner[inner < TOP], TOP], least)
         knots = finer if finer.size <= MOST_KNOTS else knots
-        for slip in slips[(slips > THRESHOLDS[0]) & (slips < THRESHOLDS[-1])]:
-            if bearings.size < MOST_BEARINGS and np.abs(np.r_[THRESHOLDS, bearings] - slip).min() >= CLOSEST:
-                bearings = np.sort(np.r_[bearings, slip])
-    return replace(linear.reducer, knots=knots, bearings=bearings)
+    return replace(linear.reducer, knots=knots)

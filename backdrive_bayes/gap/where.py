@@ -37,16 +37,20 @@ class Gap:
 
 
 def estimate_gap(linear: Linear, rng) -> Gap:
-    """The process along each leg beside the clean class, all effects at trace level."""
-    group = path_group(linear.reduced, UNKNOWN)
+    """The process along each leg beside the clean class, all effects at trace level; that of each record has a scale of its own,
+    or what one record has would be shared out among all."""
     usual = UNKNOWN.present(linear.reduced.context)
-    beside = linear.beside(group, usual)
-    solution = learn_scales(beside, levels(linear, ()) | {UNKNOWN.name: (float(np.log(usual)), 2.0)})[2]
-    own = beside.design.index == beside.design.names.index(UNKNOWN.name)
+    records = path_group(linear.reduced, UNKNOWN).by_record()
+    beside = linear
+    for record in records:
+        beside = beside.beside(record, usual)
+    priors = levels(linear, ()) | {record.name: (float(np.log(usual)), 2.0) for record in records}
+    solution = learn_scales(beside, priors)[2]
+    parts = beside.design.split(np.arange(solution.mean.size))
     noise = rng.standard_normal((solution.root.shape[1], 200)) * np.sqrt(solution.variance)
     scale, mean, error = linear.reduced.angle_scale_rad, [], []
-    for r in range(len(linear.angles)):
-        columns = group.of_record(r) * scale
+    for r, record in enumerate(records):
+        own, columns = parts[record.name], record.of_record(r) * scale
         columns = columns - columns.mean(axis=0)
         mean.append(columns @ solution.mean[own])
         error.append(columns @ (solution.root[own] @ noise))

@@ -10,7 +10,7 @@ from backdrive_bayes.engine.parameters import posterior_parameters
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators.loop import Loops, cut_loops, loop_grid, settled_history, settled_loops
-from backdrive_bayes.mechanics.reducer import FRICTION
+from backdrive_bayes.mechanics.friction import FRICTION
 
 KEPT_A_CHAIN = 100
 """Draws of each chain that are used where many loops are wanted."""

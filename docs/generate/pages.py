@@ -34,16 +34,15 @@ from backdrive_bayes.engine import (
 from backdrive_bayes.gap import examine, probabilities, properties, shrink
 from backdrive_bayes.indicators import same_loop
 from backdrive_bayes.indicators.draws import UNITS
-from backdrive_bayes.mechanics import history, reducer
+from backdrive_bayes.mechanics import clearance, friction, history, part, reducer
 from backdrive_bayes.mechanics.effects import noncongruent_loops, viscoelastic_creep
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records import lines
 
 NUMBERS = {
-    "thresholds": str(reducer.THRESHOLDS.size),
-    "read_outs": str(len(reducer.READ_OUTS) - 1),
-    "seen": f"{reducer.LEFT_OUT:g}",
-    "bearings": str(search.MOST_BEARINGS),
+    "thresholds": str(friction.THRESHOLDS.size),
+    "read_outs": str(len(friction.READ_OUTS) - 1),
+    "seen": f"{friction.LEFT_OUT:g}",
     "flanks": str(search.MOST_FLANKS),
     "ratios": str(flanks.RATIOS.size),
     "film": f"{history.FILM:g}",
@@ -51,9 +50,9 @@ NUMBERS = {
     "noncongruent": f"{noncongruent_loops.USUAL:g}",
     "bent": f"{linearise.BENT:g}",
     "harmonics": str(periodic.HARMONICS),
-    "shared": f"{reducer.SHARED:g}",
-    "alike": f"{reducer.ALIKE:g}",
-    "largest_drag": f"{reducer.LARGEST_DRAG:g}",
+    "shared": f"{part.SHARED:g}",
+    "alike": f"{clearance.ALIKE:g}",
+    "largest_drag": f"{clearance.LARGEST_DRAG:g}",
     "power": f"{infer.POWER:.2f}",
     "power_dof": f"{infer.POWER_DOF:g}",
     "reached": f"{100 * infer.REACHED:g} %",

@@ -10,7 +10,8 @@ from backdrive_bayes.bench.known_truth import BenchNoise
 from backdrive_bayes.engine import search
 from backdrive_bayes.engine.flanks import select_flank
 from backdrive_bayes.engine.reduced import reduce_unit
-from backdrive_bayes.mechanics.reducer import ReducerClass, flank
+from backdrive_bayes.mechanics.friction import flank
+from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.mechanics.registry import library_terms
 
 RATIO, COMPLIANCE = 0.45, 0.5

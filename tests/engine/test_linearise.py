@@ -20,8 +20,10 @@ from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.gap.hypotheses import weigh
+from backdrive_bayes.mechanics.clearance import HALVINGS
 from backdrive_bayes.mechanics.effect import Distortion
-from backdrive_bayes.mechanics.reducer import BASELINE, HALVINGS, ReducerClass
+from backdrive_bayes.mechanics.effects import noncongruent_loops
+from backdrive_bayes.mechanics.reducer import BASELINE, ReducerClass
 from backdrive_bayes.mechanics.registry import LIBRARY, library_terms
 
 
@@ -135,17 +137,12 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     monkeypatch.setattr(search, "MOST_KNOTS", clean.reducer.knots.size + 20)
     monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
     refined = search._finer(clean)
-    found, bearings = refined.knots, refined.bearings
+    found = refined.knots
     low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
     assert clean.reducer.knots.size < found.size <= search.MOST_KNOTS
     new = np.setdiff1d(found, clean.reducer.knots)
     width = high - low
     assert np.any((new > low - width) & (new < high + width))
-    # The same block slips at half its distance from the last turning point.
-    tip = clean.reduced.blocks[0].turning_nm[1] / clean.reduced.torque_scale_nm
-    slip = 0.5 * abs(clean.reduced.blocks[0].torque_nm[first] / clean.reduced.torque_scale_nm - tip)
-    more = np.setdiff1d(bearings, clean.reducer.bearings)
-    assert 0 < more.size <= search.MOST_BEARINGS and np.abs(more - slip).min() < width
 
 
 def test_nothing_counts_where_the_past_decides(clean):
@@ -225,15 +222,16 @@ def test_friction_that_follows_the_rate_at_the_moment_is_found_in_records_of_one
 
 
 def test_a_law_of_the_rate_is_told_from_one_of_the_amplitude_by_two_rates_of_one_amplitude():
-    """Where the small loop is the fast one, friction may follow either (planted fault): a law of the amplitude that would do
-    instead is rare."""
+    """Where the small loop is the fast one, friction may follow either (planted fault): all that tells is how rare a law of the
+    amplitude is that would do instead."""
 
     def factor(*loops, seed=0):
         unit = planted(seed, known=_rough_reducer(4.0), exponent=0.2, loops=loops)
         return weigh(linearise(reduce_unit(unit), library_terms())).log_factor[(LAW,)]
 
     confounded = [factor((0.1, 0.02), (0.05, 0.1), seed=seed) for seed in range(3)]
-    assert np.median(confounded) < 6.0 and max(confounded) < 10.0
+    rare = 0.5 * (0.2 * np.log(5.0) / np.log(2.0) / noncongruent_loops.USUAL) ** 2
+    assert np.median(confounded) < 6.0 and max(confounded) < rare + 2.0
     assert factor((0.1, 0.02), (0.1, 0.1), (0.05, 0.1)) > 30.0
 
 

@@ -22,7 +22,8 @@ from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import SIZE as BENCH_FRICTION
 from backdrive_bayes.mechanics.effects.viscoelastic_creep import BEFORE
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import TOP, ReducerClass
+from backdrive_bayes.mechanics.part import TOP
+from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.records.reduction import Blocks
 
 TERMS = {t.name: t for terms in registry.LIBRARY.values() for t in terms} | {registry.UNKNOWN.name: registry.UNKNOWN}

@@ -7,8 +7,8 @@ from support.planted import by_hand, smooth_reducer
 
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.mechanics import history as module
+from backdrive_bayes.mechanics.friction import FRICTION
 from backdrive_bayes.mechanics.history import of_blocks, through
-from backdrive_bayes.mechanics.reducer import FRICTION
 from backdrive_bayes.records.reduction import Blocks
 
 SCALE, RATE = 0.1, 0.05

@@ -6,19 +6,11 @@ import pytest
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.cells import Cells
+from backdrive_bayes.mechanics.clearance import place_knots, spaced
+from backdrive_bayes.mechanics.friction import FRICTION, THRESHOLDS, flank, plays, principal_components
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import (
-    BASELINE,
-    FRICTION,
-    THRESHOLDS,
-    TOP,
-    ReducerClass,
-    flank,
-    place_knots,
-    plays,
-    principal_components,
-    spaced,
-)
+from backdrive_bayes.mechanics.part import TOP
+from backdrive_bayes.mechanics.reducer import BASELINE, ReducerClass
 
 KNOTS = np.r_[0.0, np.geomspace(0.01, TOP, 20)]
 REDUCER = ReducerClass(KNOTS)
@@ -152,20 +144,6 @@ def test_denser_thresholds_leave_the_prior_of_the_loop_as_it_is():
     cells, root = plays(dense)
     level = np.sqrt(np.sum(root**2, axis=1))
     assert width(cells, root * (level.max() / level)[:, None]) > 1.3 * usual
-
-
-def test_a_bearing_that_slips_at_one_torque_is_held_at_every_amplitude_by_its_own_threshold():
-    """One play operator between two thresholds of the first grid, on loops of three amplitudes: what the best weights leave, with
-    and without a threshold of its own."""
-    r = 0.5 * (THRESHOLDS[-4] + THRESHOLDS[-3])
-    history = ramp(0.0, 1.0, -1.0, 0.9, -0.9, 0.97, -0.97)
-    truth = Cells(*(np.array([v]) for v in (r - TOP, -r - TOP, 2 * TOP, 2.0))).ends(history)[:, 0]
-
-    def left(*bearings):
-        columns = np.hstack(list(ReducerClass(KNOTS, BASELINE, np.array(bearings)).ends(history).values()))
-        return np.abs(truth - columns @ np.linalg.lstsq(columns, truth, rcond=1e-9)[0]).max()
-
-    assert left(r) < 1e-6 < 1e-3 < left()
 
 
 def coulomb(torque, ratio):

@@ -10,7 +10,7 @@ from backdrive_bayes.bench.known_truth import KnownReducer, physical_reducer
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.mechanics.effect import Context, Distortion
-from backdrive_bayes.mechanics.reducer import loops as usual_loops
+from backdrive_bayes.mechanics.friction import loops as usual_loops
 from backdrive_bayes.mechanics.registry import LIBRARY
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.reduction import Blocks

@@ -12,8 +12,9 @@ from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.search import Search
+from backdrive_bayes.mechanics.friction import FRICTION
 from backdrive_bayes.mechanics.history import through
-from backdrive_bayes.mechanics.reducer import BASELINE, FRICTION
+from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.records.record import Record, Unit
 
 NOISE = BenchNoise()
