@@ -47,7 +47,7 @@ def _oddest_offset(reduced) -> float:
         for k in range(1 if blocks.direction.size > 1 else 0, blocks.direction.size):
             own, sign = blocks.leg == k, float(blocks.direction[k])
             if abs(blocks.turning_nm[k + 1] - blocks.turning_nm[k]) > 1.2 * reduced.torque_scale_nm:
-                z = blocks.torque_nm[own] * sign / reduced.torque_scale_nm
+                z = np.maximum.accumulate(blocks.torque_nm[own] * sign) / reduced.torque_scale_nm
                 legs[sign].append(np.interp(TORQUES, z, angle[own] * sign))
     if not legs[1.0] or not legs[-1.0]:
         return 0.0

@@ -1,8 +1,8 @@
 """The path of the torque along a record: straight pieces, as few as the samples ask for.
 
 History operators must not be driven by the noise of the torque channel, and must not be spared what the torque does: ramps,
-dwells, stairs, rounded tips and torque by hand are straight pieces all, of which a sine has many. Within a leg the path does not
-go back.
+dwells, stairs, rounded tips and torque by hand are straight pieces all, of which a sine has many. Within a leg the path only goes
+back where the angle does.
 """
 
 from __future__ import annotations
@@ -81,7 +81,8 @@ def follow_torque(record: Record, segments, sd_nm: float, ends_s: tuple[float, f
     # Samples may share a stamp.
     time = np.maximum.accumulate(nodes) + 1e-12 * (nodes[-1] - nodes[0]) * np.arange(len(nodes))
     tips = _tips(record, segments, time, np.array(values))
-    torque = _monotone(np.array(values), np.array(samples, float), tips, [s.direction for s in segments])
+    turns = _turns(record, time, np.array(values), tips, [s.direction for s in segments])
+    torque = _monotone(np.array(values), np.array(samples, float), turns)
     return TorquePath(time, torque, torque[tips], np.array(samples))
 
 
@@ -98,12 +99,33 @@ def _tips(record, segments, time, torque) -> list[int]:
     return found
 
 
-def _monotone(torque, samples, tips, directions) -> np.ndarray:
-    """The path without what goes back within a leg, as a motor surges where a clearance is crossed: the tips stay."""
-    weight = np.r_[samples, 0.0] + np.r_[0.0, samples]
-    weight[tips] = TIP * weight.max()
+def _turns(record, time, torque, tips, directions) -> list[int]:
+    """Knots at which the path turns: the tips, and within legs both ends of what goes back with the angle. A shaft whose torque
+    goes back turns back; where it goes on, the drive has surged, as when a clearance is crossed."""
+    found = [tips[0]]
     for direction, begin, end in zip(directions, tips[:-1], tips[1:], strict=True):
-        own = slice(begin, end + 1)
+        backward = np.r_[0, direction * np.diff(torque[begin : end + 1]) < 0.0, 0].astype(int)
+        bounds = begin + np.flatnonzero(np.diff(backward)).reshape(-1, 2)
+        for first, last in bounds.tolist():
+            if begin < first and last < end and direction * _turned(record, time[first], time[last]) < 0.0:
+                found += [first, last]
+        found.append(end)
+    return found
+
+
+def _turned(record, begin_s, end_s) -> float:
+    """Slope of the angle in time between two instants, up to a positive factor."""
+    own = slice(*np.searchsorted(record.time_s, [begin_s, end_s]) + np.array([-1, 1]))
+    time = record.time_s[own]
+    return float((time - time.mean()) @ record.angle_rad[own])
+
+
+def _monotone(torque, samples, turns) -> np.ndarray:
+    """The path without what goes back between two turns, which stay."""
+    weight = np.r_[samples, 0.0] + np.r_[0.0, samples]
+    weight[turns] = TIP * weight.max()
+    for begin, end in pairwise(turns):
+        own, direction = slice(begin, end + 1), np.sign(torque[end] - torque[begin])
         torque[own] = direction * isotonic_regression(direction * torque[own], weights=weight[own]).x
     return torque
 

@@ -38,10 +38,11 @@ def test_no_block_is_halved_to_less_than_few_samples(monkeypatch):
     assert np.all(halved >= np.minimum(whole, reduction.FEW))
 
 
-def turned(torque, time, *, noise=2e-3, seed=0, kept=slice(None)):
-    """A unit with one record of this torque [N·m], read with noise."""
+def turned(torque, time, *, acting=None, noise=2e-3, seed=0, kept=slice(None)):
+    """A unit with one record of this torque [N·m], read with noise; ``acting`` is what turns the angle, by default the same."""
     rng = np.random.default_rng(seed)
-    angle, read = answer(torque) + 2e-5 * rng.standard_normal(time.size), torque + noise * rng.standard_normal(time.size)
+    angle = answer(torque if acting is None else acting) + 2e-5 * rng.standard_normal(time.size)
+    read = torque + noise * rng.standard_normal(time.size)
     return Unit("u", 1.0, (Record("r.csv", time[kept], read[kept], angle[kept], 0.1),))
 
 
@@ -139,6 +140,26 @@ def test_a_bit_of_a_leg_at_an_end_bends_no_other(reached):
     blocks = reduce_unit(turned(torque, time)).blocks[0]
     assert np.abs(np.interp(time, blocks.path_s, blocks.path_nm) - torque).max() < 6e-3
     assert np.abs(blocks.turning_nm[1:-1]) == pytest.approx(1.0, abs=4e-3)
+
+
+@pytest.mark.parametrize("turns_back", [True, False])
+def test_a_torque_that_goes_back_within_a_leg_is_followed_where_the_angle_turns_back(turns_back, monkeypatch):
+    """By hand a torque goes back by a twentieth of its range, and so does the angle; where a drive surges, the angle goes on.
+    The planted fault takes the one for the other."""
+    time, torque = ramps((0, 1, 0.5, 0.6, -1, -0.3, -0.4, 1, 0), rate=0.1, hertz=500.0)
+    tips = [0.0, *(float(time[f(torque)]) for f in (np.argmax, np.argmin)), float(time[torque > 0.999][-1]), float(time[-1])]
+    acting = torque if turns_back else np.interp(time, tips, [0.0, 1.0, -1.0, 1.0, 0.0])
+
+    def turns():
+        blocks = reduce_unit(turned(torque, time, acting=acting)).blocks[0]
+        assert blocks.direction.size == 4
+        steps = np.diff(blocks.path_nm)
+        return int(np.count_nonzero(np.diff(np.sign(steps[steps != 0.0]))))
+
+    assert turns() == (7 if turns_back else 3)
+    turned_of = torque_path._turned
+    monkeypatch.setattr(torque_path, "_turned", lambda *where: -turned_of(*where))
+    assert turns() == (3 if turns_back else 7)
 
 
 def test_short_rests_between_fast_rises_are_followed(monkeypatch):
