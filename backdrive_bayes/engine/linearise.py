@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from backdrive_bayes.engine.design import Group, grown_histories
+from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group, rises
 from backdrive_bayes.engine.reduced import Reduced
@@ -95,7 +96,18 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
     found = [linear for some, linear in apart.items() if set(some) <= set(bent) and possible(linear)]
+    # At the joint mode a drift may stand for a wander.
+    wandering, gain = learn_wander(_calm(apart.get((), joint)))
+    if gain > 0 and wandering.noise != joint.reduced.noise:
+        own = replace(free, reduced=wandering, only=())
+        found.append(own.find_mode(joint, _only(lawless, ())))
     return tuple(linear.without(WAVE) for linear in (joint, *found))
+
+
+def _calm(linear: Linear) -> Linear:
+    """The same where every effect is at trace level."""
+    _, log_scale, solution = learn_scales(linear, levels(linear, ()))
+    return replace(linear, log_scale=dict(zip(linear.design.names, log_scale.tolist(), strict=True)), solution=solution)
 
 
 def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
