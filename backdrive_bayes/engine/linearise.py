@@ -75,10 +75,12 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
 
-    def mode(some: tuple[str, ...]) -> Linear:
+    def mode(some: tuple[str, ...], *near: Distortion) -> Linear:
         fixed = (*free.fixed, *(waves if WAVE in some else ()))
         own = replace(free, reduced=joint.reduced, fixed=fixed, only=some)
-        return own.find_mode(joint, _only(reach if LAW in some else lawless, some))
+        ends = [own.find_mode(joint, at) for at in (_only(reach if LAW in some else lawless, some), *near)]
+        # A class that is learnt beside what bends may want it.
+        return max(ends if some else [*ends, own.learn(*near)], key=lambda linear: linear.log_marginal)
 
     def possible(linear: Linear) -> bool:
         return WAVE not in linear.design.names or rises(linear, frequency)
@@ -89,7 +91,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         apart[(LAW,)] = mode((LAW,))
         bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent
     if bent:
-        apart |= {some: apart.get(some) or mode(some) for some in ((), *((name,) for name in bent))}
+        apart[()] = mode((), Distortion())
+        apart |= {(name,): apart.get((name,)) or mode((name,), apart[()].distortion) for name in bent}
         bent = tuple(name for name in bent if possible(apart[(name,)]))
         # Of two that act together each alone is likelier than nothing; beside a law of the rate no creep acted.
         least = apart[()].log_marginal
@@ -97,10 +100,10 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
     found = [linear for some, linear in apart.items() if set(some) <= set(bent) and possible(linear)]
     # At the joint mode a drift may stand for a wander.
-    wandering, gain = learn_wander(_calm(apart.get((), joint)))
+    straight = apart.get((), joint)
+    wandering, gain = learn_wander(_calm(straight))
     if gain > 0 and wandering.noise != joint.reduced.noise:
-        own = replace(free, reduced=wandering, only=())
-        found.append(own.find_mode(joint, _only(lawless, ())))
+        found.append(replace(free, reduced=wandering, only=()).find_mode(straight, _only(straight.distortion, ())))
     return tuple(linear.without(WAVE) for linear in (joint, *found))
 
 
