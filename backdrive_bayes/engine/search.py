@@ -122,20 +122,21 @@ class Search:
             covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
         idle: set[str] = set()
 
-        def about(at: Distortion, known) -> Linear:
-            return self._linear(like.reducer, at, covariances, known, like.jitter, idle)
+        def about(at: Distortion, best: Linear | None = None) -> Linear:
+            known, weights = (best.log_scale, best.weights) if best else ({}, None)
+            return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
 
-        best, share = about(distortion, {}), 1.0
+        best, share = about(distortion), 1.0
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
-                best = about(best.distortion, best.log_scale)
+                best = about(best.distortion, best)
             moved = self._moved(best)
             apart = length(moved, best.distortion, context)
             here = self._log_density(best, best.log_scale)
             if share * (self._log_density(best, best.log_scale, moved) - here) < STILL:
                 break
-            tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best.log_scale)
+            tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best)
             if self._log_density(tried, best.log_scale) < here:
                 share *= SHORTER
             else:

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from backdrive_bayes.mechanics.history import History
-from backdrive_bayes.mechanics.relays import LEAST_WIDTH, ends, means, summed, surged_ends, surged_means, surged_sum
+from backdrive_bayes.mechanics.relays import LEAST_WIDTH, ends, first_states, means, summed, surged_ends, surged_means, surged_sum
 
 CROSSED = 0.7
 """Torque, in shares of the largest, by which clearances are crossed: relays beyond stand for friction near the loop's tip."""
@@ -123,13 +123,7 @@ class Cells:
     def _relays(self, start, state):
         """Switching torques, widths and first states of all relays."""
         up, down, width, fall, clearance = self._both
-        high, low = (np.clip((start - edge) / wide, 0.0, 1.0) for edge, wide in ((down, fall), (up, width)))
-        first = {"upper": high, "lower": low}.get(state)
-        if first is None:
-            # A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing from its noise.
-            at_rest = np.where(clearance, 0.5, (2.0 * start - up - down) / (width + fall))
-            first = np.minimum(np.maximum(at_rest, low), high)
-        return up, down, width, fall, first
+        return up, down, width, fall, first_states(start, START.index(state), up, down, width, fall, clearance)
 
     def _paired(self, response, sign):
         """Responses of pairs (…, cells) from those of all relays (relays, …)."""

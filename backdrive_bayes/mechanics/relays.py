@@ -26,6 +26,20 @@ def _integral(value):
 
 
 @numba.njit(cache=True)
+def first_states(start, state, up, down, width, fall, clearance):
+    """Shares (cells,) that are up at the torque ``start`` at rest (``state`` 0), after a large positive torque (1) or after a large
+    negative one (2). A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing from
+    its noise."""
+    out = np.empty(up.size)
+    for j in range(up.size):
+        high = min(max((start - down[j]) / fall[j], 0.0), 1.0)
+        low = min(max((start - up[j]) / width[j], 0.0), 1.0)
+        rest = 0.5 if clearance[j] else (2.0 * start - up[j] - down[j]) / (width[j] + fall[j])
+        out[j] = high if state == 1 else low if state == 2 else min(max(rest, low), high)
+    return out
+
+
+@numba.njit(cache=True)
 def _turns(z0, z1):
     """Numbers of the segments at which the torque turns, the first and one past the last among them."""
     found, rising = [0], 0.0
@@ -39,62 +53,79 @@ def _turns(z0, z1):
     return np.array(found)
 
 
+@numba.njit(cache=True, inline="always")
+def _beyond(z1, i, end, level, way):
+    """The first segment from ``i`` on, before the next turn ``end``, that ends beyond a torque."""
+    while i < end:
+        middle = (i + end) // 2
+        if way * (z1[middle] - level) > 0.0:
+            end = middle
+        else:
+            i = middle + 1
+    return i
+
+
 @numba.njit(cache=True)
-def _follow(mean, x, z0, z1, turns, a, b, u, d):
-    """Means (segments,) of the share of a cell's relays that are up along every segment; between turns it moves once, if at
-    all."""
+def _step(steps, share, x, z0, z1, turns, a, b, u, d):
+    """Add ``share`` of a cell to the ``steps`` (segments + 1,) from one segment's mean to the next: between turns it moves once, if
+    at all, and where it rests there is none."""
+    steps[0] += share * x
     for r in range(turns.size - 1):
         i, end = turns[r], turns[r + 1]
         last, first = z1[end - 1], z0[i]
         if last > first and x < 1.0 and last > a + u * x:
-            while z1[i] <= a + u * x:
-                mean[i] = x
-                i += 1
+            i = _beyond(z1, i, end, a + u * x, 1.0)
             while i < end and x < 1.0:
                 p, q = (z0[i] - a) / u, (z1[i] - a) / u
-                mean[i] = x
                 if q > p:
-                    turn = max(p, x)
-                    mean[i] = (x * (turn - p) + _integral(q) - _integral(turn)) / (q - p)
-                    x = max(x, min(q, 1.0))
+                    turn, reached = max(p, x), max(x, min(q, 1.0))
+                    mean = (x * (turn - p) + _integral(q) - _integral(turn)) / (q - p)
+                    steps[i] += share * (mean - x)
+                    steps[i + 1] += share * (reached - mean)
+                    x = reached
                 i += 1
         elif last < first and x > 0.0 and last < b + d * x:
-            while z1[i] >= b + d * x:
-                mean[i] = x
-                i += 1
+            i = _beyond(z1, i, end, b + d * x, -1.0)
             while i < end and x > 0.0:
                 p, q = (z0[i] - b) / d, (z1[i] - b) / d
-                mean[i] = x
                 if q < p:
-                    turn = min(p, x)
-                    mean[i] = (x * (p - turn) + _integral(turn) - _integral(q)) / (p - q)
-                    x = min(x, max(q, 0.0))
+                    turn, reached = min(p, x), min(x, max(q, 0.0))
+                    mean = (x * (p - turn) + _integral(turn) - _integral(q)) / (p - q)
+                    steps[i] += share * (mean - x)
+                    steps[i + 1] += share * (reached - mean)
+                    x = reached
                 i += 1
-        mean[i:end] = x
 
 
 @numba.njit(cache=True, nogil=True)
 def means(z0, z1, weight, block, blocks, up, down, width, fall, first):
     """Exact means over blocks of the states along straight segments, shape (cells, blocks)."""
-    out, mean, turns = np.zeros((up.size, blocks)), np.empty(z0.size), _turns(z0, z1)
+    out, steps, turns = np.zeros((up.size, blocks)), np.empty(z0.size + 1), _turns(z0, z1)
     for j in range(up.size):
-        _follow(mean, first[j], z0, z1, turns, up[j], down[j], width[j], fall[j])
-        for i in range(z0.size):
-            out[j, block[i]] += weight[i] * mean[i]
+        steps[:] = 0.0
+        _step(steps, 1.0, first[j], z0, z1, turns, up[j], down[j], width[j], fall[j])
+        _gather(out[j], steps, weight, block)
     return out
 
 
 @numba.njit(cache=True, nogil=True)
 def summed(z0, z1, weight, block, blocks, up, down, width, fall, first, share):
     """The same times the cells' shares, (blocks,)."""
-    out, mean, turns, total = np.zeros(blocks), np.empty(z0.size), _turns(z0, z1), np.zeros(z0.size)
+    out, steps, turns = np.zeros(blocks), np.zeros(z0.size + 1), _turns(z0, z1)
     for j in range(up.size):
-        _follow(mean, first[j], z0, z1, turns, up[j], down[j], width[j], fall[j])
-        for i in range(z0.size):
-            total[i] += share[j] * mean[i]
-    for i in range(z0.size):
-        out[block[i]] += weight[i] * total[i]
+        if share[j] != 0.0:
+            _step(steps, share[j], first[j], z0, z1, turns, up[j], down[j], width[j], fall[j])
+    _gather(out, steps, weight, block)
     return out
+
+
+@numba.njit(cache=True)
+def _gather(out, steps, weight, block):
+    """Add to the blocks' means (blocks,) what the ``steps`` from one segment's mean to the next make."""
+    total = 0.0
+    for i in range(block.size):
+        total += steps[i]
+        out[block[i]] += weight[i] * total
 
 
 @numba.njit(cache=True, nogil=True)
