@@ -62,8 +62,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     """The joint model's mode and modes of what bends the prediction.
 
     Whatever cannot be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own:
-    one where none of them acts, and those of each and of each pair without the others. A hypothesis is weighed about the mode
-    where it is likeliest.
+    one where none of them acts, and those of each and of each pair without the others; all may have the class and noise of the
+    likeliest. A hypothesis is weighed about the mode where it is likeliest.
     """
     free, starts = Search.over(reduced, effects, modules), possible_starts(reduced)
     joint, waves, frequency = joint_mode(free, starts)
@@ -75,9 +75,12 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
     reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
 
+    def search(some: tuple[str, ...] | None, like: Linear) -> Search:
+        fixed = (*free.fixed, *(waves if some is None or WAVE in some else ()))
+        return replace(free, reduced=like.reduced, fixed=fixed, only=some)
+
     def mode(some: tuple[str, ...], *near: Distortion) -> Linear:
-        fixed = (*free.fixed, *(waves if WAVE in some else ()))
-        own = replace(free, reduced=joint.reduced, fixed=fixed, only=some)
+        own = search(some, joint)
         ends = [own.find_mode(joint, at) for at in (_only(reach if LAW in some else lawless, some), *near)]
         # A class that is learnt beside what bends may want it.
         return max(ends if some else [*ends, own.learn(*near)], key=lambda linear: linear.log_marginal)
@@ -98,13 +101,28 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         least = apart[()].log_marginal
         likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
-    found = [linear for some, linear in apart.items() if set(some) <= set(bent) and possible(linear)]
+
+    modes = {None: joint} | {some: end for some, end in apart.items() if set(some) <= set(bent) and possible(end)}
+    modes = _in_one_class(modes, max(modes.values(), key=lambda linear: linear.log_marginal), search)
     # At the joint mode a drift may stand for a wander.
-    straight = apart.get((), joint)
+    straight, steady = modes.get((), modes[None]), []
     wandering, gain = learn_wander(_calm(straight))
-    if gain > 0 and wandering.noise != joint.reduced.noise:
-        found.append(replace(free, reduced=wandering, only=()).find_mode(straight, _only(straight.distortion, ())))
-    return tuple(linear.without(WAVE) for linear in (joint, *found))
+    if gain > 0 and wandering.noise != straight.reduced.noise:
+        still = replace(search((), straight), reduced=wandering)
+        steady = [still.find_mode(straight, _only(straight.distortion, ()))]
+        modes = _in_one_class(modes, steady[0], search)
+    return tuple(linear.without(WAVE) for linear in (*modes.values(), *steady))
+
+
+def _in_one_class(modes, like: Linear, search) -> dict:
+    """Modes by what may act, each in the class and noise of one of them where it is likelier there: what acts is not weighed by
+    the class that its own search came upon. ``search`` is that of what may act, in the noise of a mode."""
+    found = {}
+    for some, linear in modes.items():
+        same = linear.reducer is like.reducer and linear.reduced is like.reduced
+        there = linear if same else search(some, like).find_mode(like, linear.distortion)
+        found[some] = max(linear, there, key=lambda mode: mode.log_marginal)
+    return found
 
 
 def _calm(linear: Linear) -> Linear:

@@ -7,23 +7,28 @@ windows at each frequency keeps cliffs and jumps of the loop from passing as noi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 
 from backdrive_bayes.records.white_noise import white_noise
 
-PRIOR_CORRELATION_TIME_S = 0.03
-PRIOR_LOG_SD = 0.5
-PRIOR_SD = np.array([4.0, 4.0, PRIOR_LOG_SD])
-"""Of the log standard deviations about what the spectrum's ends tell, and of the log correlation time."""
+PRIOR_CORRELATION_TIME_S, PRIOR_LOG_SD = 0.03, 0.5
+PRIOR_CORRELATED_SAMPLES, PRIOR_SAMPLES_LOG_SD = 8.0, 0.8
+"""Correlation time, or its number of samples, and the standard deviation of their logarithms: what vibrates does so as long at every
+rate, a filter that works in samples leaves as many of them."""
+LEVEL_LOG_SD = 4.0
+"""Standard deviation of the log levels of the noise about what the spectrum's ends tell."""
 POLISHING = 4
 """Newton steps after the search, which stops where the likelihood is flat to its eighth digit: its last bits must not matter."""
 WINDOWS_PER_SEGMENT = 16
 SHORTEST_WINDOW, LONGEST_WINDOW = 16, 2048
 """Samples of a window: from fewer no spectrum can be made, and in more a short ramp's own shape would pass as noise."""
 TREND_DEGREE = 3
+ALIKE = 1.5
+"""Ratio of the time between samples of two records below which they tell nothing of whether noise lasts for a time or for
+samples."""
 SWAYS = 2.0
 """Variance of a torque beside its trend, in that of its noise, from which on it is taken for real."""
 
@@ -68,31 +73,34 @@ def estimate_noise(time_s, torque_nm, angle_rad, segments) -> NoiseEstimate:
 def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
     """Noise of the records of one bench: common angle noise, torque noise of each record.
 
-    Records too short for a spectrum count only where all are; the angle's noise then comes from second differences.
+    The correlation lasts as long in all records, or as many samples, whichever is likelier. Records too short for a spectrum count
+    only where all are; the angle's noise then comes from second differences.
     """
     spectra = [median_periodogram(r) for r in records if longest(r) >= SHORTEST_WINDOW]
     if not spectra:
         return tuple(_rough_noise(r) for r in records)
-    theta, covariance = _fit_spectra(spectra)
+    theta, covariance, in_samples = _fit_spectra(spectra)
     sd = np.minimum(np.sqrt(np.diag(covariance)), 3.0)
     correlated, white, correlation = (float(v) for v in np.exp(theta))
-    gradient = _block_gradient(correlated, white, correlation, spectra[0].step_s)
-    dof = float(np.clip(2.0 / max(gradient @ covariance @ gradient, 1e-9), 4.0, 1e5))
-    torque = [_noise_of(r.torque_nm, r.time_s) for r in records]
-    return tuple(
-        NoiseEstimate(
+    found = []
+    for record in records:
+        step = float(np.median(np.diff(record.time_s)))
+        time = correlation * step if in_samples else correlation
+        gradient = _block_gradient(correlated, white, time, step)
+        level, error = _noise_of(record.torque_nm, record.time_s)
+        estimate = NoiseEstimate(
             white_rad=white,
             correlated_rad=correlated,
-            correlation_time_s=correlation,
+            correlation_time_s=time,
             torque_nm=level,
             white_rad_sd=float(white * sd[1]),
             correlated_rad_sd=float(correlated * sd[0]),
-            correlation_time_s_sd=float(correlation * sd[2]),
+            correlation_time_s_sd=float(time * sd[2]),
             torque_nm_sd=error,
-            scale_dof=dof,
+            scale_dof=float(np.clip(2.0 / max(gradient @ covariance @ gradient, 1e-9), 4.0, 1e5)),
         )
-        for level, error in torque
-    )
+        found.append(estimate)
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,15 +170,29 @@ def median_periodogram(record: ChannelRecord) -> Spectrum:
 
 
 def _fit_spectra(spectra):
-    """Log correlated and white standard deviations and log correlation time with their covariance."""
+    """Log correlated and white standard deviations and log correlation time with their covariance, and whether that time is in
+    samples."""
+    prior = np.log(PRIOR_CORRELATION_TIME_S), PRIOR_LOG_SD
+    found = [(*_fit(spectra, *prior), False)]
+    steps = [s.step_s for s in spectra]
+    if max(steps) > ALIKE * min(steps):
+        prior = np.log(PRIOR_CORRELATED_SAMPLES), PRIOR_SAMPLES_LOG_SD
+        found.append((*_fit([replace(s, step_s=1.0) for s in spectra], *prior), True))
+    _, best, covariance, in_samples = min(found, key=lambda one: one[0])
+    return best, covariance, in_samples
+
+
+def _fit(spectra, log_time, log_time_sd):
+    """Least cost of all spectra with the parameters there and their covariance."""
     low = np.median([np.log(s.power[0] + 1e-40) for s in spectra])
     high = np.median([np.log(np.median(s.power[3 * s.power.size // 4 :]) + 1e-40) for s in spectra])
-    centre = np.array([0.5 * low, 0.5 * high, np.log(PRIOR_CORRELATION_TIME_S)])
+    centre, spread = np.array([0.5 * low, 0.5 * high, log_time]), np.array([LEVEL_LOG_SD, LEVEL_LOG_SD, log_time_sd])
 
     def cost(theta):
-        away = (theta - centre) / PRIOR_SD
+        away = (theta - centre) / spread
         found = [s.cost(theta) for s in spectra]
-        return sum(f for f, _ in found) + 0.5 * away @ away, sum(g for _, g in found) + away / PRIOR_SD
+        value = sum(f for f, _ in found) + 0.5 * away @ away + np.log(log_time_sd)
+        return value, sum(g for _, g in found) + away / spread
 
     floor = centre - [12, 12, 0]
     floor[2] = np.log(min(s.step_s for s in spectra))
@@ -187,7 +209,7 @@ def _fit_spectra(spectra):
         if cost(moved)[0] > cost(best)[0] + 1e-9:
             break
         best = moved
-    return best, np.linalg.pinv(_hessian(cost, best), hermitian=True)
+    return cost(best)[0], best, np.linalg.pinv(_hessian(cost, best), hermitian=True)
 
 
 def _hessian(function, x, h=1e-4):

@@ -295,6 +295,18 @@ def test_a_step_that_promises_too_much_is_shortened(searching, monkeypatch):
     assert density(free, wild, best.log_scale) < density(free, best, best.log_scale) - 10.0
 
 
+def test_modes_are_compared_in_the_class_of_the_likeliest(searching):
+    """A mode in a class of few knots (planted fault) is lower by its class, not by what acts."""
+    free, like = searching
+    few = replace(like.reducer, knots=like.reducer.knots[[0, -30, -1]])
+    poor = replace(free, only=("torque_offset",)).find_mode(free._anew(like, reducer=few), like.distortion)
+    assert poor.log_marginal < like.log_marginal - 20.0
+    modes = {None: like, ("torque_offset",): poor}
+    found = engine._in_one_class(modes, like, lambda some, mode: replace(free, reduced=mode.reduced, only=some))
+    assert found[None] is like and found[("torque_offset",)].reducer is like.reducer
+    assert found[("torque_offset",)].log_marginal > like.log_marginal - 5.0
+
+
 @pytest.mark.parametrize("options", [{"offset_nm": 8e-4}, {"lag_s": 0.03, "loops": MORE}])
 def test_a_search_ends_where_its_own_straight_line_leads_nowhere(options):
     """Of a mode without what distorts, which misfits: there the prior scales with the noise, or good steps are refused."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.bench import KNOWN_NOISE, unit_of
 
-from backdrive_bayes.bench.known_truth import BenchNoise
+from backdrive_bayes.bench.known_truth import BenchNoise, angle_noise
 from backdrive_bayes.records import noise
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise, estimate_noise
@@ -132,3 +132,25 @@ def _stairs(samples, step=50):
     """Sample numbers that rest and leap."""
     edges = np.arange(0, samples, step)
     return np.sort(np.r_[edges, edges[1:] - 1]), np.repeat(edges, 2)[: 2 * edges.size - 1]
+
+
+@pytest.mark.parametrize("in_samples", [True, False])
+def test_noise_lasts_for_a_time_or_for_samples(in_samples, monkeypatch):
+    """Records read at 100 Hz and at 10 Hz. Where noise of samples is taken to last for a time (planted fault), the mean of a slow
+    record's blocks is far more certain than it is."""
+    rng, torque = np.random.default_rng(1), np.concatenate([np.linspace(-1, 1, 1500), np.linspace(1, -1, 1500)] * 2)
+    records, times = [], []
+    for step in (0.01, 0.1):
+        times.append(8 * step if in_samples else 0.05)
+        added = angle_noise(torque.size, step, BenchNoise(1e-4, 1e-4, times[-1], 0.0), rng)
+        time = np.arange(torque.size) * step
+        read = torque + 1e-5 * rng.standard_normal(torque.size)
+        records.append(ChannelRecord(time, read, 0.1 * torque + added, find_segments(time, torque)))
+
+    def slow(estimates):
+        """Variance of long means of the slow record over the true one, but for the white part."""
+        return (estimates[1].correlated_rad / 1e-4) ** 2 * estimates[1].correlation_time_s / times[1]
+
+    assert 0.5 < slow(estimate_common_noise(records)) < 2.0
+    monkeypatch.setattr(noise, "ALIKE", np.inf)
+    assert (slow(estimate_common_noise(records)) < 0.5) is in_samples
