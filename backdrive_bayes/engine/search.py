@@ -138,7 +138,8 @@ class Search:
                 break
             tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best)
             if self._log_density(tried, best.log_scale) < here:
-                share *= SHORTER
+                # Derivatives are those at the weights of the model before; now at those that it found.
+                best, share = about(best.distortion, best), SHORTER * share
             else:
                 best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
         return best
