@@ -30,7 +30,8 @@ class Contrasts:
 
     ``gram`` (weights, weights), ``moment`` (weights,), ``total``; ``index`` numbers the group of a weight;
     ``samples`` is the number of independent contrasts. ``white`` (samples, weights) are the whitened columns and ``held`` what
-    the class holds of them, of which the Gram matrices are made.
+    the class, and whatever else is integrated, holds of them, of which the Gram matrices are made; ``log_volume`` is what a
+    further group that is integrated costs.
     """
 
     names: tuple[str, ...]
@@ -42,18 +43,43 @@ class Contrasts:
     noise_dof: float
     white: np.ndarray
     held: np.ndarray
+    log_volume: float = 0.0
 
-    def joined(self, more: Contrasts) -> Contrasts:
-        """The same contrasts with further columns, made with the same linear model."""
-        across = self.white.T @ more.white - self.held.T @ more.held
+    def integrated(self, name: str, scale: float) -> Integrated:
+        """A group whose weights of standard deviation ``scale`` are to be integrated as those of the class are."""
+        of = self.index == self.names.index(name)
+        on, lower, seen = self._solved(np.where(of, scale, 0.0))
+        return Integrated(of, lower, scale * self.white[:, on], scale * self.held[:, on], scale, seen)
+
+    def beside(self, part: Integrated) -> Contrasts:
+        """The same without a group of its own that is integrated."""
+        rest = np.flatnonzero(~part.of)
+        across = part.across(part.scale * self.gram[np.ix_(part.of, rest)])
+        return replace(
+            self,
+            index=self.index[rest],
+            gram=self.gram[np.ix_(rest, rest)] - across.T @ across,
+            moment=self.moment[rest] - across.T @ part.seen,
+            total=self.total - float(part.seen @ part.seen),
+            white=self.white[:, rest],
+            held=np.vstack([self.held[:, rest], across]),
+            log_volume=self.log_volume + float(np.log(np.diag(part.lower)).sum()),
+        )
+
+    def joined(self, more: Contrasts, part: Integrated) -> Contrasts:
+        """The same and ``more`` columns, made with the same linear model, of which the group that is integrated here holds too;
+        the last that are joined."""
+        beyond = part.across(part.white.T @ more.white - part.held.T @ more.held)
+        held = np.vstack([more.held, beyond])
+        across = self.white.T @ more.white - self.held.T @ held
         return replace(
             self,
             names=(*self.names, *more.names),
             index=np.r_[self.index, more.index + len(self.names)],
-            gram=np.block([[self.gram, across], [across.T, more.gram]]),
-            moment=np.r_[self.moment, more.moment],
-            white=np.hstack([self.white, more.white]),
-            held=np.hstack([self.held, more.held]),
+            gram=np.block([[self.gram, across], [across.T, more.gram - beyond.T @ beyond]]),
+            moment=np.r_[self.moment, more.moment - beyond.T @ part.seen],
+            white=more.white[:, :0],
+            held=held[:, :0],
         )
 
     def log_marginal(self, scale, one_way: Sequence[int] = ()) -> float:
@@ -68,7 +94,7 @@ class Contrasts:
         rest, left = self.gram[np.ix_(columns, columns)] - across.T @ across, self.moment[columns] - across.T @ seen
         along = [solve_triangular(lower, (on == w).astype(float), lower=True, check_finite=False) for w in one_way]
         base, dof, found = self._chi2(seen), self.noise_dof + self.samples, []
-        volume = float(np.log(np.diag(lower)).sum())
+        volume = self.log_volume + float(np.log(np.diag(lower)).sum())
         for size in sizes:
             more = np.linalg.cholesky(np.eye(columns.size) + np.outer(size, size) * rest)
             further = np.linalg.solve(more, size * left)
@@ -115,6 +141,23 @@ class Contrasts:
         inner[np.diag_indices_from(inner)] += 1.0
         lower = cholesky(inner, lower=True, check_finite=False)
         return on, lower, solve_triangular(lower, scale[on] * self.moment[on], lower=True, check_finite=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Integrated:
+    """A group of weights among contrasts, integrated: the Cholesky factor of their precision, their columns in units of their
+    standard deviation ``scale``, whitened and as the class holds them, and their scores. ``of`` (weights,) says which they are."""
+
+    of: np.ndarray
+    lower: np.ndarray
+    white: np.ndarray
+    held: np.ndarray
+    scale: float
+    seen: np.ndarray
+
+    def across(self, products) -> np.ndarray:
+        """What the group holds of further columns, of its columns' scalar ``products`` with them."""
+        return solve_triangular(self.lower, products, lower=True, check_finite=False)
 
 
 def make_contrasts(linear: Linear, groups: tuple[Group, ...]) -> Contrasts:

@@ -81,7 +81,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
 
     def mode(some: tuple[str, ...], *near: Distortion) -> Linear:
         own = search(some, joint)
-        ends = [own.find_mode(joint, at) for at in (_only(reach if LAW in some else lawless, some), *near)]
+        ends = [own.find_mode(joint, at) for at in dict.fromkeys((_only(reach if LAW in some else lawless, some), *near))]
         # A class that is learnt beside what bends may want it.
         return max(ends if some else [*ends, own.learn(*near)], key=lambda linear: linear.log_marginal)
 
@@ -102,7 +102,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
 
-    modes = {None: joint} | {some: end for some, end in apart.items() if set(some) <= set(bent) and possible(end)}
+    modes = {None: joint} | _reached({some: end for some, end in apart.items() if set(some) <= set(bent) and possible(end)})
     modes = _in_one_class(modes, max(modes.values(), key=lambda linear: linear.log_marginal), search)
     # At the joint mode a drift may stand for a wander.
     straight, steady = modes.get((), modes[None]), []
@@ -111,7 +111,17 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         still = replace(search((), straight), reduced=wandering)
         steady = [still.find_mode(straight, _only(straight.distortion, ()))]
         modes = _in_one_class(modes, steady[0], search)
-    return tuple(linear.without(WAVE) for linear in (*modes.values(), *steady))
+    first, *others = modes.values()
+    return tuple(linear.without(WAVE) for linear in _distinct(first, (*others, *steady)))
+
+
+def _reached(modes: dict) -> dict:
+    """Modes by what may act without those whose search did not reach them: with less to act another is as likely."""
+
+    def missed(some, linear):
+        return any(set(less) < set(some) and other.log_marginal >= linear.log_marginal for less, other in modes.items())
+
+    return {some: linear for some, linear in modes.items() if not missed(some, linear)}
 
 
 def _in_one_class(modes, like: Linear, search) -> dict:
@@ -158,6 +168,17 @@ def _bends(name: str, distortion: Distortion, context) -> bool:
 def _only(distortion: Distortion, some) -> Distortion:
     """A distortion by some effects alone."""
     return replace(distortion, **{p: 0.0 for n, places in BENDING.items() if n not in some for p in places})
+
+
+def _distinct(first: Linear, others) -> list[Linear]:
+    """The first mode and others but for those of which one of the same class and noise that is as likely is hardly apart."""
+    kept, context = [first], first.reduced.context
+    for linear in sorted(others, key=lambda mode: -mode.log_marginal):
+        alike = (one for one in kept if one.reducer is linear.reducer and one.reduced is linear.reduced)
+        as_likely = [one.distortion for one in alike if one.log_marginal >= linear.log_marginal]
+        if len(_apart([*as_likely, linear.distortion], context)) > len(_apart(as_likely, context)):
+            kept.append(linear)
+    return kept
 
 
 def _apart(starts, context):

@@ -34,8 +34,8 @@ LEARNINGS = 4
 STEPS = 14
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque, exponents fifty times as much."""
-STILL = 0.05
-"""Rise of the log density, as a straight line promises it, below which the search ends."""
+STILL = 0.3
+"""Rise of the log density, as a straight line promises it, below which the search ends: knots make it rougher than that."""
 SHORTER, MOST_LENGTHENED = 0.25, 8.0
 """Share to which a step that does not rise is shortened, and by how much one may be lengthened while they rise."""
 LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from backdrive_bayes.engine.contrasts import SIZES, Contrasts, averaged, effect_groups, make_contrasts
-from backdrive_bayes.engine.design import path_group
+from backdrive_bayes.engine.contrasts import SIZES, Contrasts, Integrated, averaged, effect_groups, make_contrasts
+from backdrive_bayes.engine.design import Group, path_group
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
@@ -103,10 +103,10 @@ def _level(table: _Table, names) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Wave:
-    """Columns of a wave among contrasts and their usual sizes, its frequency, what it costs not to know that, and the log prior
-    probability of it."""
+    """The number of the coarse bank's wave that it is about, its columns among contrasts and their usual sizes, its frequency, what
+    it costs not to know that, and the log prior probability of it."""
 
-    contrasts: Contrasts
+    at: int
     columns: np.ndarray
     sizes: np.ndarray
     frequency: float
@@ -115,18 +115,21 @@ class _Wave:
 
 
 class _Table:
-    """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods."""
+    """Scales of the contrasts' weights by hypothesis, and their log marginal likelihoods.
+
+    The many weights of a process on each leg are integrated once for each of its levels, as those of the class are.
+    """
 
     def __init__(self, linear: Linear, jumps: Jumps, line: float):
         self.phases = phases(linear)
         self.coarse = coarse_bank(self.phases)
-        waves = replace(wave_group(linear, self.coarse.waves), name=WAVES)
+        self.linear = linear
         unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
-        self.linear, self.contrasts = linear, make_contrasts(linear, (*effect_groups(linear), *unlisted))
-        self.waved = self.contrasts.joined(make_contrasts(linear, (waves,)))
-        contrasts = self.contrasts
+        self.contrasts = make_contrasts(linear, (*effect_groups(linear), *unlisted, self._waves(self.coarse)))
+        rest = self.contrasts.index[self.contrasts.index != self.contrasts.names.index(UNEXPLAINED)]
+        self.index, self.waves = rest, int(np.searchsorted(rest, self.contrasts.names.index(WAVES)))
         effects, context = {e.name: e for e in linear.effects} | {UNEXPLAINED: UNKNOWN}, linear.reduced.context
-        self.names = contrasts.names
+        self.names = self.contrasts.names
         traces = trace_levels(linear.reduced, linear.design.joined(unlisted[0]), effects.values())
         self.trace = np.array([traces.get(n, 0.0) for n in self.names])
         usual = {e.name: usual_level(e, context, traces.get(e.name, 0.0)) for e in linear.effects}
@@ -135,7 +138,7 @@ class _Table:
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
         self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
         one_way = [n for n, e in effects.items() if isinstance(e, TangentEffect) and e.one_way and n in self.names]
-        self.one_way = {n: np.flatnonzero(contrasts.index == self.names.index(n)).tolist() for n in one_way}
+        self.one_way = {n: np.flatnonzero(self.index == self.names.index(n)).tolist() for n in one_way}
         # What teeth leave in the block means, without and with an encoder's wave beside.
         self.jumping = {False: _traces(jumps), True: _traces(jumps)}
         self.line = line
@@ -143,13 +146,30 @@ class _Table:
         self.frequency: dict[tuple[str, ...], float] = {}
         self.price: dict[tuple[str, ...], float] = {}
         self.singles: dict[tuple[str, ...], float] = {}
-        self._waves: dict[frozenset[str], _Wave] = {}
+        self._clear: dict[frozenset[str], _Wave] = {}
         self._near: dict[int, Contrasts] = {}
+        self._integrated: dict[float, tuple[Integrated, Contrasts]] = {}
+        self._nearby: dict[tuple[int, float], Contrasts] = {}
+
+    def _waves(self, bank) -> Group:
+        return replace(wave_group(self.linear, bank.waves), name=WAVES)
+
+    def _unlisted(self, on, size: float = 1.0) -> float:
+        """Standard deviation of the process on each leg where the terms ``on`` are present."""
+        at = self.names.index(UNEXPLAINED)
+        return float(size * self.present[at] if UNEXPLAINED in on else self.trace[at])
+
+    def _beside(self, level: float) -> tuple[Integrated, Contrasts]:
+        """The process on each leg at a level, and the other contrasts beside it."""
+        if level not in self._integrated:
+            part = self.contrasts.integrated(UNEXPLAINED, level)
+            self._integrated[level] = part, self.contrasts.beside(part)
+        return self._integrated[level]
 
     def scale(self, on, size: float = 1.0) -> np.ndarray:
-        """Standard deviations of all weights where the terms ``on`` are present at ``size`` times their usual level."""
+        """Standard deviations of all other weights where the terms ``on`` are present at ``size`` times their usual level."""
         level = np.where(np.isin(self.names, list(on)), size * self.present, self.trace)
-        return level[self.contrasts.index]
+        return level[self.index]
 
     def log_marginal(self, hypothesis) -> float:
         """Log marginal likelihood of a set of names, averaged over sizes, frequencies and kinds of what is unlisted."""
@@ -173,21 +193,22 @@ class _Table:
             # Beside something unlisted, the first kind is the one whose columns a fit takes.
             self.frequency.setdefault(hypothesis, wave.frequency)
             self.price.setdefault(hypothesis, wave.price)
-            return self._averaged(wave.contrasts, on, wave.columns, wave.sizes) - wave.price
+            return self._averaged(on, wave.at, wave.columns, wave.sizes) - wave.price
         # Every bench has a trace of a wave, most likely where a wave is clearest beside one effect.
         beside = max((h for h in self.singles if set(h) <= set(hypothesis)), key=self.singles.__getitem__, default=())
         wave = self._clearest(self._on(beside))
-        without, with_trace = self._sized(wave.contrasts, on, wave.columns, (0.0, self.trace_wave) * wave.sizes[:, None])
+        without, with_trace = self._sized(on, wave.at, wave.columns, (0.0, self.trace_wave) * wave.sizes[:, None])
         found = float(np.logaddexp(without, with_trace + wave.log_prior))
         if len(hypothesis) == 1 and UNEXPLAINED not in hypothesis:
             self.singles[hypothesis] = found
         return found
 
-    def _sized(self, contrasts, on, columns, sizes) -> list[float]:
+    def _sized(self, on, at, columns, sizes) -> list[float]:
         """Log marginal likelihoods beside the terms ``on``, averaged over their size, for each of ``sizes`` (width, n) of further
-        columns."""
+        ``columns``, of the waves about one of the coarse bank where ``at`` says which."""
         found = []
         for size in SIZES if on else (1.0,):
+            contrasts = self._about(at, self._unlisted(on, size))
             scale = _padded(self.scale(on, size), contrasts)
             found.append(contrasts.log_marginals(scale, columns, np.transpose(sizes), self._one_way(on)))
         return [averaged(log) for log in np.transpose(found)] if on else found[0].tolist()
@@ -198,55 +219,60 @@ class _Table:
 
     def left(self, hypothesis) -> float:
         """Variance of the contrasts in noise units that a hypothesis leaves."""
-        scale = self.scale(self._on(hypothesis), SIZES[-1])
-        if hypothesis not in self.frequency:
-            return self.contrasts.chi2(scale)
-        at = int(np.argmin(np.abs(self.coarse.members - self.frequency[hypothesis])))
-        near, fine, columns = self._about(at)
-        member = int(np.argmin(np.abs(fine.members - self.frequency[hypothesis])))
-        scale = _padded(scale, near)
-        scale[columns[member]] = SIZES[-1] * fine.sizes[member]
-        return near.chi2(scale)
+        on, at = self._on(hypothesis), None
+        if hypothesis in self.frequency:
+            at = int(np.argmin(np.abs(self.coarse.members - self.frequency[hypothesis])))
+        contrasts = self._about(at, self._unlisted(on, SIZES[-1]))
+        scale = _padded(self.scale(on, SIZES[-1]), contrasts)
+        if at is not None:
+            fine = fine_bank(self.coarse.members[at], self.phases)
+            member = int(np.argmin(np.abs(fine.members - self.frequency[hypothesis])))
+            scale[self.index.size + fine.columns[member]] = SIZES[-1] * fine.sizes[member]
+        return contrasts.chi2(scale)
 
-    def _about(self, at: int):
-        """Contrasts with the waves closely about one of the coarse bank, these waves, and the numbers of their columns."""
-        fine = fine_bank(self.coarse.members[at], self.phases)
+    def _about(self, at: int | None, level: float) -> Contrasts:
+        """Contrasts beside the process on each leg at a level, with the waves closely about one of the coarse bank if it is given."""
+        part, contrasts = self._beside(level)
+        if at is None:
+            return contrasts
         if at not in self._near:
-            waves = replace(wave_group(self.linear, fine.waves), name=WAVES)
-            self._near[at] = self.contrasts.joined(make_contrasts(self.linear, (waves,)))
-        return self._near[at], fine, self.contrasts.index.size + fine.columns
+            self._near[at] = make_contrasts(self.linear, (self._waves(fine_bank(self.coarse.members[at], self.phases)),))
+        if (at, level) not in self._nearby:
+            self._nearby[at, level] = contrasts.joined(self._near[at], part)
+        return self._nearby[at, level]
 
     def _with_step(self, on) -> float:
         """Log marginal likelihood averaged over all instants of a step."""
-        columns = np.flatnonzero(self.contrasts.index == self.names.index("step"))[:, None]
-        gains = self.contrasts.gains(self.scale(on), columns, np.full(columns.shape, AMPLITUDE))
+        _, contrasts = self._beside(self._unlisted(on))
+        columns = np.flatnonzero(self.index == self.names.index("step"))[:, None]
+        gains = contrasts.gains(self.scale(on), columns, np.full(columns.shape, AMPLITUDE))
         at = int(np.argmax(gains))
         price = gains[at] - (logsumexp(gains) - np.log(gains.size))
-        return self._averaged(self.contrasts, on, columns[at], np.full(1, AMPLITUDE)) - price
+        return self._averaged(on, None, columns[at], np.full(1, AMPLITUDE)) - price
 
     def _clearest(self, on) -> _Wave:
         """The clearest wave beside the terms ``on``, and what it costs not to know its frequency."""
-        key = frozenset(on)
-        if key in self._waves:
-            return self._waves[key]
-        scale = _padded(self.scale(on), self.waved)
-        gains = self.waved.gains(scale, self.contrasts.index.size + self.coarse.columns, self.coarse.sizes)
+        key, level, scale = frozenset(on), self._unlisted(on), self.scale(on)
+        if key in self._clear:
+            return self._clear[key]
+        gains = self._beside(level)[1].gains(scale, self.waves + self.coarse.columns, self.coarse.sizes)
         weight, fine = log_prior(self.coarse.members), {}
         for at in _alike(gains + weight, self.coarse.members):
-            near, bank, columns = self._about(at)
-            closely = near.gains(_padded(self.scale(on), near), columns, bank.sizes)
-            gains[at], fine[at] = logsumexp(closely) - np.log(closely.size), (near, bank, columns, closely)
+            near, bank = self._about(at, level), fine_bank(self.coarse.members[at], self.phases)
+            columns = self.index.size + bank.columns
+            closely = near.gains(_padded(scale, near), columns, bank.sizes)
+            gains[at], fine[at] = logsumexp(closely) - np.log(closely.size), (bank, columns, closely)
         at = max(fine, key=lambda at: gains[at] + weight[at])
-        near, bank, columns, closely = fine[at]
+        bank, columns, closely = fine[at]
         member = int(np.argmax(closely))
         price = closely[member] - logsumexp(gains + weight)
         chance = weight[at] - np.log(closely.size)
-        wave = _Wave(near, columns[member], bank.sizes[member], float(bank.members[member]), float(price), float(chance))
-        return self._waves.setdefault(key, wave)
+        wave = _Wave(at, columns[member], bank.sizes[member], float(bank.members[member]), float(price), float(chance))
+        return self._clear.setdefault(key, wave)
 
-    def _averaged(self, contrasts, on, columns, sizes) -> float:
+    def _averaged(self, on, at, columns, sizes) -> float:
         """Log marginal likelihood beside the terms ``on`` averaged over their size and over that of further columns."""
-        return averaged(self._sized(contrasts, on, columns, SIZES * sizes[..., None]))
+        return averaged(self._sized(on, at, columns, SIZES * sizes[..., None]))
 
 
 def _traces(jumps: Jumps) -> set[str]:

@@ -252,6 +252,31 @@ def test_further_columns_weigh_as_if_they_had_been_there_and_gains_are_exact(pro
     assert abs(linear - exact) > 0.05 * abs(exact)
 
 
+def test_a_group_that_is_integrated_first_weighs_as_among_the_others(problem):
+    """Of all columns, of some that are joined later, and of what is left; the planted fault: what was joined holds nothing of the
+    group."""
+    data = whiten(*problem, DOF)
+    names, scale, size = ("class", "group", "more"), np.repeat([1.0, 0.2, 0.0], 3), np.array([[0.7, 0.7, 1.4]])
+
+    def made(own):
+        x = data.x[:, own]
+        gram, moment, none = data.gram[np.ix_(own, own)], data.moment[own], np.zeros((0, len(own)))
+        index = np.unique(GROUP[own], return_inverse=True)[1]
+        some = tuple(names[g] for g in np.unique(GROUP[own]))
+        return Contrasts(some, index, gram, moment, data.total, data.samples, data.noise_dof, x, none)
+
+    whole, few, more = made(np.arange(9)), made(np.arange(6)), made(np.arange(6, 9))
+    part, beside = few.integrated("group", 0.2), few.beside(few.integrated("group", 0.2))
+    exact = whole.log_marginals(scale, np.arange(6, 9), size, [1])
+    joined = beside.joined(more, part)
+    assert joined.log_marginals(np.repeat([1.0, 0.0], 3), np.arange(3, 6), size, [1]) == pytest.approx(exact)
+    alike = whole.beside(whole.integrated("group", 0.2))
+    assert alike.log_marginals(np.repeat([1.0, 0.0], 3), np.arange(3, 6), size, [1]) == pytest.approx(exact)
+    assert beside.chi2(np.ones(3)) == pytest.approx(few.chi2(scale[:6]))
+    apart = beside.joined(more, replace(part, white=0.0 * part.white))
+    assert abs(apart.log_marginals(np.repeat([1.0, 0.0], 3), np.arange(3, 6), size, [1]) - exact) > 0.01
+
+
 def test_held_weights_and_the_data_have_the_dense_joint_density(problem):
     """Of both the data and the held weights, up to a constant: by a multivariate t of everything that is seen."""
     columns, angles, covariances = problem
