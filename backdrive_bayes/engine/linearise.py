@@ -111,8 +111,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         still = replace(search((), straight), reduced=wandering)
         steady = [still.find_mode(straight, _only(straight.distortion, ()))]
         modes = _in_one_class(modes, steady[0], search)
-    first, *others = modes.values()
-    return tuple(linear.without(WAVE) for linear in _distinct(first, (*others, *steady)))
+    return tuple(linear.without(WAVE) for linear in (*modes.values(), *steady))
 
 
 def _reached(modes: dict) -> dict:
@@ -168,17 +167,6 @@ def _bends(name: str, distortion: Distortion, context) -> bool:
 def _only(distortion: Distortion, some) -> Distortion:
     """A distortion by some effects alone."""
     return replace(distortion, **{p: 0.0 for n, places in BENDING.items() if n not in some for p in places})
-
-
-def _distinct(first: Linear, others) -> list[Linear]:
-    """The first mode and others but for those of which one of the same class and noise that is as likely is hardly apart."""
-    kept, context = [first], first.reduced.context
-    for linear in sorted(others, key=lambda mode: -mode.log_marginal):
-        alike = (one for one in kept if one.reducer is linear.reducer and one.reduced is linear.reduced)
-        as_likely = [one.distortion for one in alike if one.log_marginal >= linear.log_marginal]
-        if len(_apart([*as_likely, linear.distortion], context)) > len(_apart(as_likely, context)):
-            kept.append(linear)
-    return kept
 
 
 def _apart(starts, context):

@@ -34,7 +34,7 @@ LEARNINGS = 4
 STEPS = 14
 LONGEST_STEP = 2e-3
 """Longest step of a distortion, in shares of the torque, exponents fifty times as much."""
-STILL = 0.3
+STILL = 0.1
 """Rise of the log density, as a straight line promises it, below which the search ends: knots make it rougher than that."""
 SHORTER, MOST_LENGTHENED = 0.25, 8.0
 """Share to which a step that does not rise is shortened, and by how much one may be lengthened while they rise."""
