@@ -360,7 +360,7 @@ def cycloid_pins(rng):
 def planet_stages(rng):
     """Two stages in a row, each with three to five planets of unequal pin clearance which come to share the load."""
     stage = []
-    for i in range(2):
+    for _ in range(2):
         n = int(rng.integers(3, 6))
         gap = draw(rng, 0.01, 0.25) * rng.uniform(0.1, 1.0, n)
         stiff = rng.uniform(0.6, 1.4, n) * 1.6 / n
@@ -489,9 +489,16 @@ def indicators(x, angle, rated, k, n):
     """Loop quantities of the settled cycle ``x`` (tip, zero, tip, zero, tip; ``n`` steps a quarter), torque in N m."""
     down_x, down = x[:2 * n + 1][::-1], angle[:2 * n + 1][::-1]
     up_x, up = x[2 * n:4 * n + 1], angle[2 * n:4 * n + 1]
-    up_at = lambda q: np.interp(q, up_x, up)
-    down_at = lambda q: np.interp(q, down_x, down)
-    middle = lambda q: 0.5 * (up_at(q) + down_at(q))
+
+    def up_at(q):
+        return np.interp(q, up_x, up)
+
+    def down_at(q):
+        return np.interp(q, down_x, down)
+
+    def middle(q):
+        return 0.5 * (up_at(q) + down_at(q))
+
     area = float(np.trapezoid(down_at(up_x) - up, up_x))
     absorbed = float(np.trapezoid(up_x[n:], up[n:]) + np.trapezoid(down_x[:n + 1][::-1], down[:n + 1][::-1]))
     return {"lost_motion_rad": float(middle(k * rated) - middle(-k * rated)), "backlash_rad": float(down_at(0.0) - up_at(0.0)),
@@ -515,7 +522,7 @@ def new_reducer(rng, family):
         odd = np.abs(three[:2 * n + 1] + three[2 * n:]).max()
         if 0.001 <= lost <= 0.40 and 0.05 <= ratio <= 0.60 and odd < 1e-3:
             gain = windup / peak
-            return (lambda q: gain * raw(q)), windup, attempt
+            return (lambda q, gain=gain, raw=raw: gain * raw(q)), windup, attempt
     raise RuntimeError("no reducer of this family: " + family.__name__)
 
 
@@ -542,7 +549,7 @@ def torque_path(rng, style, amplitude, rate, start, cycles):
         tips.append(0.0)
     if style == "hand":
         slack = 1.0 - np.abs(rng.normal(0.0, 0.004, len(tips)))
-        tips = [q if i == 1 else q * s for i, (q, s) in enumerate(zip(tips, slack))]
+        tips = [q if i == 1 else q * s for i, (q, s) in enumerate(zip(tips, slack, strict=True))]
     t, x = [np.zeros(1)], [np.zeros(1)]
     begin = 0.0
     for i in range(1, len(tips)):
@@ -603,7 +610,10 @@ def new_effect(rng, name, unit):
     """Draw a variant of an effect for a unit; ``s`` is still to be found."""
     n = len(unit["records"])
     period = min(4.0 * r["amplitude"] / r["rate"] for r in unit["records"])
-    pick = lambda *names: names[int(rng.integers(0, len(names)))]
+
+    def pick(*names):
+        return names[int(rng.integers(0, len(names)))]
+
     e = {"variant": "", "s": 0.0, "sign": pick(-1, 1)}
     if name == "torque_offset":
         e["variant"] = pick("constant", "tare_per_record", "zero_walk")
@@ -682,7 +692,10 @@ def front_nodes(unit, record, effects, q):
 def members(unit, record, effects, q, base):
     """Sum of the members in series that effects add, in parts of the wind-up (``base`` is the angle of the reducer)."""
     t, out = record["t"], np.zeros_like(q)
-    passed = lambda drag: soft_node(q, drag, 0.0, 0.3)
+
+    def passed(drag):
+        return soft_node(q, drag, 0.0, 0.3)
+
     for name, e in effects.items():
         s = e["s"] * e["sign"]
         if name == "viscoelastic_creep":
@@ -747,7 +760,7 @@ def simulate(unit, record, effects):
         out = out + e["s"] * e["sign"] * e["share"][i] * shape
     e = effects.get("x_lost_counts")
     if e:
-        out = out + sum(e["s"] * e["sign"] * (part > at) for k, at in zip(e["which"], e["part"]) if k == i)
+        out = out + sum(e["s"] * e["sign"] * (part > at) for k, at in zip(e["which"], e["part"], strict=True) if k == i)
     return out[record["keep"]:] * w
 
 

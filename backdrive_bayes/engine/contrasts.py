@@ -146,7 +146,7 @@ class Contrasts:
 @dataclass(frozen=True, eq=False)
 class Integrated:
     """A group of weights among contrasts, integrated: the Cholesky factor of their precision, their columns in units of their
-    standard deviation ``scale``, whitened and as the class holds them, and their scores. ``of`` (weights,) says which they are."""
+    standard deviation ``scale``, whitened and as the class holds them, and their scores; ``of`` (weights,) marks them."""
 
     of: np.ndarray
     lower: np.ndarray

@@ -103,8 +103,8 @@ def _level(table: _Table, names) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Wave:
-    """The number of the coarse bank's wave that it is about, its columns among contrasts and their usual sizes, its frequency, what
-    it costs not to know that, and the log prior probability of it."""
+    """The number of the coarse bank's wave that it is about, its columns among contrasts and their usual sizes, its frequency,
+    what it costs not to know that, and the log prior probability of it."""
 
     at: int
     columns: np.ndarray
@@ -231,7 +231,7 @@ class _Table:
         return contrasts.chi2(scale)
 
     def _about(self, at: int | None, level: float) -> Contrasts:
-        """Contrasts beside the process on each leg at a level, with the waves closely about one of the coarse bank if it is given."""
+        """Contrasts beside the process on each leg at a level, with the waves closely about one of the coarse bank, or none."""
         part, contrasts = self._beside(level)
         if at is None:
             return contrasts

@@ -79,12 +79,6 @@ def plays(thresholds) -> tuple[Cells, np.ndarray]:
     return Cells(up, down, width, np.full(up.size, 2.0)), root
 
 
-def _slips(thresholds, share) -> tuple[Cells, np.ndarray]:
-    """Plays of some thresholds whose read-out is a straight line, and the root of the prior covariance of their weights."""
-    cells = Cells(thresholds, -thresholds, TOP - thresholds, np.full(thresholds.size, 2.0))
-    return cells, _root(thresholds, share * np.ones(thresholds.size), 1.0)
-
-
 @lru_cache(maxsize=128)
 def flank(ratio: float) -> tuple[Cells, np.ndarray]:
     """A flank with Coulomb friction in proportion to its load, which slips back at ``ratio`` of the torque at which it slipped

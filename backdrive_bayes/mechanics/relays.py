@@ -27,8 +27,8 @@ def _integral(value):
 
 @numba.njit(cache=True)
 def first_states(start, state, up, down, width, fall, clearance):
-    """Shares (cells,) that are up at the torque ``start`` at rest (``state`` 0), after a large positive torque (1) or after a large
-    negative one (2). A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing from
+    """Shares (cells,) that are up at the torque ``start`` at rest (``state`` 0), after a large positive torque (1) or after a
+    large negative one (2). A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing from
     its noise."""
     out = np.empty(up.size)
     for j in range(up.size):
@@ -67,8 +67,8 @@ def _beyond(z1, i, end, level, way):
 
 @numba.njit(cache=True)
 def _step(steps, share, x, z0, z1, turns, a, b, u, d):
-    """Add ``share`` of a cell to the ``steps`` (segments + 1,) from one segment's mean to the next: between turns it moves once, if
-    at all, and where it rests there is none."""
+    """Add ``share`` of a cell to the ``steps`` (segments + 1,) from one segment's mean to the next: between turns it moves once,
+    if at all, and where it rests there is none."""
     steps[0] += share * x
     for r in range(turns.size - 1):
         i, end = turns[r], turns[r + 1]

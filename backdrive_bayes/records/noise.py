@@ -16,8 +16,8 @@ from backdrive_bayes.records.white_noise import white_noise
 
 PRIOR_CORRELATION_TIME_S, PRIOR_LOG_SD = 0.03, 0.5
 PRIOR_CORRELATED_SAMPLES, PRIOR_SAMPLES_LOG_SD = 8.0, 0.8
-"""Correlation time, or its number of samples, and the standard deviation of their logarithms: what vibrates does so as long at every
-rate, a filter that works in samples leaves as many of them."""
+"""Correlation time, or its number of samples, and the standard deviation of their logarithms: what vibrates does so as long at
+every rate, a filter that works in samples leaves as many of them."""
 LEVEL_LOG_SD = 4.0
 """Standard deviation of the log levels of the noise about what the spectrum's ends tell."""
 POLISHING = 4
@@ -73,8 +73,8 @@ def estimate_noise(time_s, torque_nm, angle_rad, segments) -> NoiseEstimate:
 def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
     """Noise of the records of one bench: common angle noise, torque noise of each record.
 
-    The correlation lasts as long in all records, or as many samples, whichever is likelier. Records too short for a spectrum count
-    only where all are; the angle's noise then comes from second differences.
+    The correlation lasts as long in all records, or as many samples, whichever is likelier. Records too short for a spectrum
+    count only where all are; the angle's noise then comes from second differences.
     """
     spectra = [median_periodogram(r) for r in records if longest(r) >= SHORTEST_WINDOW]
     if not spectra:
