@@ -77,7 +77,10 @@ def one_unit(folder: Path, truth: dict) -> dict:
             continue
         true = own.get("indicators") or truth["indicators"][min(truth["indicators"], key=lambda r: abs(float(r) - rate))]
         # Where amplitudes differ from record to record, the truth is that of the rated torque, or each record has its own.
-        amplitude = own["amplitude_Nm"] if "indicators" in own else truth["rated_torque_Nm"] if "full" in own else amplitude
+        if "indicators" in own:
+            amplitude = own.get("amplitude_Nm", amplitude)
+        elif "full" in own:
+            amplitude = truth["rated_torque_Nm"]
         for name, key in TRUTH.items():
             values = draws.values(name, rate, amplitude)
             if np.isfinite(values).all():

@@ -467,7 +467,7 @@ def mindlin_spline(rng):
     def run(x):
         y = soft_node(x, seal, mu, 0.8)
         out = shaft * x + np.sign(y) * np.interp(np.abs(y), load, phi)
-        for p, s in zip(limit, share):
+        for p, s in zip(limit, share, strict=True):
             out = out + s * p * nested_memory(x, none, 1.0, p)
         return out
     return run

@@ -28,8 +28,8 @@ def _integral(value):
 @numba.njit(cache=True)
 def first_states(start, state, up, down, width, fall, clearance):
     """Shares (cells,) that are up at the torque ``start`` at rest (``state`` 0), after a large positive torque (1) or after a
-    large negative one (2). A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing from
-    its noise."""
+    large negative one (2). A clearance rests in its middle whatever the torque: narrow cells must not tell a torque of nothing
+    from its noise."""
     out = np.empty(up.size)
     for j in range(up.size):
         high = min(max((start - down[j]) / fall[j], 0.0), 1.0)
