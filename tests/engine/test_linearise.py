@@ -249,6 +249,14 @@ def test_an_offset_of_a_fifth_of_the_range_is_a_start():
         assert starts[0].offset == pytest.approx(offset_nm / 0.12, abs=3e-3)
 
 
+@pytest.mark.parametrize("loops", [((0.1, 0.02), (0.04, 0.1)), ((0.1, 0.02), (0.065, 0.05), (0.04, 0.1))])
+def test_an_offset_is_a_start_where_no_two_loops_reach_as_far(loops):
+    """Legs are compared within a record;"""
+    for offset_nm in (0.01, -0.004, 0.0):
+        reduced = reduce_unit(planted(offset_nm=offset_nm, loops=loops))
+        assert possible_starts(reduced)[0].offset * reduced.torque_scale_nm == pytest.approx(offset_nm, abs=2e-4)
+
+
 def test_a_wave_has_modes_with_and_without_it():
     waved = linearise(reduce_unit(UNITS["encoder_error"]()), library_terms())
     marginal = np.array([m.log_marginal for m in waved])
