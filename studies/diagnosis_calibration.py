@@ -54,8 +54,8 @@ score was -1.54, exact 0.60, none 0.67. No number was set on it; five harmonics 
 run whole before it was looked at (here the eighth's first run). The seventh's rows are of the code before loops that are not
 congruent, the fine plane of friction and friction that follows the rate at the moment, which came of six of its clean units whose
 amplitudes differ; those of the eighth are of the code with them, before waves that turn the reading back were refused (its
-case-08 showed one). `studies/tenth_outside_bench.py --units 80 --seed 101 --trace 0.33` is the last: its first run is of the present
-class and search, but for offsets of units whose amplitudes differ."""
+case-08 showed one). `studies/tenth_outside_bench.py --units 80 --seed 101 --trace 0.33` is the last: its first run is of the
+present class and search, but for offsets of units whose amplitudes differ."""
 HANDS = {"foreign": "foreign", "contact": "own", "mujoco": "own", "ode": "own", "sliders": "own"}
 """Whose hand a bench is of; all others are outside benches, of which the hands are alike."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]

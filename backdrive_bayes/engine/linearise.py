@@ -102,25 +102,26 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
 
-    modes = {None: joint} | _reached({some: end for some, end in apart.items() if set(some) <= set(bent) and possible(end)})
-    modes = _in_one_class(modes, max(modes.values(), key=lambda linear: linear.log_marginal), search)
+    modes = {None: joint} | {some: end for some, end in apart.items() if set(some) <= set(bent) and possible(end)}
+    modes = _reached(_in_one_class(modes, max(modes.values(), key=lambda linear: linear.log_marginal), search))
     # At the joint mode a drift may stand for a wander.
-    straight, steady = modes.get((), modes[None]), []
+    straight = modes.get((), modes[None])
     wandering, gain = learn_wander(_calm(straight))
     if gain > 0 and wandering.noise != straight.reduced.noise:
         still = replace(search((), straight), reduced=wandering)
-        steady = [still.find_mode(straight, _only(straight.distortion, ()))]
-        modes = _in_one_class(modes, steady[0], search)
-    return tuple(linear.without(WAVE) for linear in (*modes.values(), *steady))
+        steady = still.find_mode(straight, _only(straight.distortion, ()))
+        modes = _in_one_class(modes | {(): steady}, steady, search)
+    return tuple(linear.without(WAVE) for linear in modes.values())
 
 
 def _reached(modes: dict) -> dict:
-    """Modes by what may act without those whose search did not reach them: with less to act another is as likely."""
+    """Modes by what may act, the joint one and those where no other with less to act is as likely."""
 
-    def missed(some, linear):
-        return any(set(less) < set(some) and other.log_marginal >= linear.log_marginal for less, other in modes.items())
+    def spare(some, linear):
+        fewer = (other for less, other in modes.items() if less is not None and set(less) < set(some))
+        return any(other.log_marginal >= linear.log_marginal for other in fewer)
 
-    return {some: linear for some, linear in modes.items() if not missed(some, linear)}
+    return {some: linear for some, linear in modes.items() if some is None or not spare(some, linear)}
 
 
 def _in_one_class(modes, like: Linear, search) -> dict:

@@ -116,7 +116,8 @@ class Search:
     def find_mode(self, like: Linear, distortion: Distortion) -> Linear:
         """The linear model about the mode that is reached from a distortion, of the class and jitter of ``like``, and of its
         noise where both are of the same block means: a step is taken where it raises the log density of the nonlinear parameters,
-        else it is shortened. A straight line promises more than there is, or less."""
+        else it is shortened. A straight line promises more than there is, or less. Its derivatives are those at the weights of
+        the model before, at its own where a step from there was refused."""
         context, covariances = self.reduced.context, like.covariances
         if self.reduced is not like.reduced:
             covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
@@ -126,7 +127,7 @@ class Search:
             known, weights = (best.log_scale, best.weights) if best else ({}, None)
             return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
 
-        best, share = about(distortion), 1.0
+        best, share, own = about(distortion), 1.0, True
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
@@ -138,10 +139,9 @@ class Search:
                 break
             tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best)
             if self._log_density(tried, best.log_scale) < here:
-                # Derivatives are those at the weights of the model before; now at those that it found.
-                best, share = about(best.distortion, best), SHORTER * share
+                best, share, own = best if own else about(best.distortion, best), SHORTER * share, True
             else:
-                best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
+                best, share, own = tried, min(MOST_LENGTHENED, 2.0 * share), False
         return best
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:

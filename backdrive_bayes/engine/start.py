@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from backdrive_bayes.engine.reduced import Reduced
@@ -15,7 +17,7 @@ FINE = np.linspace(-0.002, 0.002, 41)
 LONG, HALF = 0.6, 0.4
 """Share of a record's torque range that a leg spans at least to be compared, and where no two of them do."""
 NEAR, LEAST = 0.3, 0.4
-"""How near to its ends, in shares of its largest torque, a leg still knows where it began, and the least share to compare."""
+"""How near to its ends, in shares of half its range, a leg still knows where it began, and the least share of it to compare."""
 USUAL = np.array([0.2, 1.0])
 """Standard deviations by which the least squares are held: lag [torque scale a unit rate], exponent."""
 
@@ -44,51 +46,83 @@ def possible_starts(reduced: Reduced) -> list[Distortion]:
 
 
 def _oddest_offset(reduced) -> float:
-    """Offset about which rising legs and mirrored falling ones of a record agree best, up to an offset of the angle."""
-    pairs = []
-    for blocks, angle in zip(reduced.blocks, reduced.angles, strict=True):
-        # A record of one cycle that begins at rest has half of one leg.
-        found = (_branches(blocks, angle, reduced.torque_scale_nm, share) for share in (LONG, HALF))
-        pairs += [legs for legs in found if len(legs) == 2][:1]
-    if not pairs:
-        return 0.0
+    """Offset about which rising legs and mirrored falling ones of a record agree best, up to an offset of the angle; none where
+    no two of them overlap enough."""
+    # A record of one cycle that begins at rest has half of one leg; legs of one direction each are those of several records.
+    records = [_legs(*each, reduced.torque_scale_nm) for each in zip(reduced.blocks, reduced.angles, strict=True)]
+    pairs = [pair for legs in records for pair in _pairs(legs)] or _pairs([leg for legs in records for leg in legs])
+    widest = max((_overlap(pair, 0.0) for pair in pairs), default=0.0)
+    pairs = [pair for pair in pairs if _overlap(pair, 0.0) > LONG * widest]
 
     def unevenness(shift):
+        # Whatever is tried, the same legs are compared.
+        if min(_overlap(pair, shift) for pair in pairs) == 0.0:
+            return np.inf
         whole, points = 0.0, 0
         for up, down in pairs:
-            low, high = max(up[0] + shift, down[0] - shift), min(up[1] + shift, down[1] - shift)
-            near = NEAR * 0.5 * (up[1] - up[0])
-            inside = (TORQUES > low + near) & (TORQUES < high - near)
-            if high - low < 2.0 * near + LEAST * (up[1] - up[0]):
-                continue
+            low, high = _compared(up, down, shift)
+            inside = (TORQUES > low) & (TORQUES < high)
             read = TORQUES[inside] - shift
-            slope = np.interp(read, TORQUES, np.gradient(up[2], TORQUES))
+            slope = np.interp(read, TORQUES, np.gradient(up.angle, TORQUES))
             weight = 1.0 / (reduced.context.angle_noise**2 + (reduced.context.torque_noise * slope) ** 2)
-            apart = np.interp(read, TORQUES, up[2]) - np.interp(TORQUES[inside] + shift, TORQUES, down[2])
+            apart = np.interp(read, TORQUES, up.angle) - np.interp(TORQUES[inside] + shift, TORQUES, down.angle)
             whole += float(np.sum(weight * (apart - np.average(apart, weights=weight)) ** 2))
             points += int(inside.sum())
-        return whole / points if points else np.inf
+        return whole / points
 
+    if not pairs:
+        return 0.0
     coarse = min(SHIFTS, key=unevenness)
     return float(min(coarse + FINE, key=unevenness))
 
 
-def _branches(blocks, angle, scale: float, share: float) -> list[tuple[float, float, np.ndarray]]:
-    """The mean rising leg of a record and the mean mirrored falling one, of legs that span at least a share of it: where they
-    begin and end, and the angle at TORQUES."""
-    long = share * np.ptp(blocks.turning_nm)
-    found = []
-    for sign in (1.0, -1.0):
-        legs = []
-        for k in range(1 if blocks.direction.size > 1 else 0, blocks.direction.size):
-            if blocks.direction[k] == sign and abs(blocks.turning_nm[k + 1] - blocks.turning_nm[k]) > long:
-                own = blocks.leg == k
-                z = np.maximum.accumulate(blocks.torque_nm[own] * sign) / scale
-                legs.append((z[0], z[-1], np.interp(TORQUES, z, angle[own] * sign)))
-        if legs:
-            first, last, angles = zip(*legs, strict=True)
-            found.append((max(first), min(last), np.mean(angles, axis=0)))
+@dataclass(frozen=True, eq=False)
+class _Leg:
+    """A leg, mirrored where it falls: torques [shares] at which it begins and ends, the angle at TORQUES, its share of its
+    record's range."""
+
+    sign: float
+    first: float
+    last: float
+    angle: np.ndarray
+    share: float
+
+
+def _legs(blocks, angle, scale: float) -> list[_Leg]:
+    """The legs of a record that span at least HALF of its range, but for the first, which the past decides."""
+    found, span = [], np.abs(np.diff(blocks.turning_nm)) / np.ptp(blocks.turning_nm)
+    for k in range(1 if blocks.direction.size > 1 else 0, blocks.direction.size):
+        if span[k] > HALF:
+            own, sign = blocks.leg == k, float(blocks.direction[k])
+            z = np.maximum.accumulate(blocks.torque_nm[own] * sign) / scale
+            found.append(_Leg(sign, z[0], z[-1], np.interp(TORQUES, z, angle[own] * sign), span[k]))
     return found
+
+
+def _pairs(legs: list[_Leg]) -> list[tuple[_Leg, _Leg]]:
+    """The mean rising leg and the mean mirrored falling one, of LONG legs if there are both, that overlap enough; or nothing."""
+    for share in (LONG, HALF):
+        both = [[leg for leg in legs if leg.sign == sign and leg.share > share] for sign in (1.0, -1.0)]
+        if all(both):
+            pair = tuple(
+                _Leg(of[0].sign, max(g.first for g in of), min(g.last for g in of), np.mean([g.angle for g in of], axis=0), share)
+                for of in both
+            )
+            return [pair] if _overlap(pair, 0.0) > 0.0 else []
+    return []
+
+
+def _compared(up: _Leg, down: _Leg, shift: float) -> tuple[float, float]:
+    """Torques between which two legs are compared at an offset: not near where they begin and end."""
+    near = NEAR * 0.5 * max(up.last - up.first, down.last - down.first)
+    return max(up.first + shift, down.first - shift) + near, min(up.last + shift, down.last - shift) - near
+
+
+def _overlap(pair, shift: float) -> float:
+    """Range of torque that two legs share at an offset, 0 where it is too little to compare them."""
+    up, down = pair
+    low, high = _compared(up, down, shift)
+    return high - low if high - low > LEAST * max(up.last - up.first, down.last - down.first) else 0.0
 
 
 def _crossings(reduced):

@@ -110,7 +110,7 @@ def through_bench(simulated: Unit, reduced: Reduced, measured: Reduced, rng) -> 
     added = BenchNoise(
         _missing(bench.white_rad, own.white_rad),
         _missing(bench.correlated_rad, own.correlated_rad),
-        bench.correlation_time_s,
+        float(np.median([n.correlation_time_s for n in measured.noise])),
         _missing(float(np.median([n.torque_nm for n in measured.noise])), own.torque_nm),
     )
     read = tuple(_read(r, step, added, rng) for r in records)

@@ -25,6 +25,7 @@ from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.effects import noncongruent_loops
 from backdrive_bayes.mechanics.reducer import BASELINE, ReducerClass
 from backdrive_bayes.mechanics.registry import LIBRARY, library_terms
+from backdrive_bayes.records.record import Record, Unit
 
 
 def mode(**options):
@@ -251,10 +252,34 @@ def test_an_offset_of_a_fifth_of_the_range_is_a_start():
 
 @pytest.mark.parametrize("loops", [((0.1, 0.02), (0.04, 0.1)), ((0.1, 0.02), (0.065, 0.05), (0.04, 0.1))])
 def test_an_offset_is_a_start_where_no_two_loops_reach_as_far(loops):
-    """Legs are compared within a record;"""
+    """Legs are compared within a record: those of all, averaged, would differ by where they turned."""
     for offset_nm in (0.01, -0.004, 0.0):
         reduced = reduce_unit(planted(offset_nm=offset_nm, loops=loops))
         assert possible_starts(reduced)[0].offset * reduced.torque_scale_nm == pytest.approx(offset_nm, abs=2e-4)
+
+
+def test_an_offset_is_a_start_where_every_record_is_one_leg():
+    whole = planted(offset_nm=-0.004)
+    records = []
+    for r in whole.records:
+        turns = [round(share * (r.time_s.size - 1)) for share in (0.2, 0.6, 1.0)]
+        for name, begin, end in (("falling", *turns[:2]), ("rising", *turns[1:])):
+            cut = {k: getattr(r, k)[begin + 1 : end] for k in ("time_s", "torque_nm", "angle_rad")}
+            records.append(replace(r, name=f"{name}-{r.name}", **cut))
+    reduced = reduce_unit(replace(whole, records=tuple(records)))
+    assert possible_starts(reduced)[0].offset * reduced.torque_scale_nm == pytest.approx(-0.004, abs=5e-4)
+
+
+@pytest.mark.parametrize("low", [0.0, 0.5, -0.3])
+def test_no_offset_is_a_start_where_no_legs_overlap(low):
+    """Loops on one side: the least unevenness over offsets that cannot be compared (planted fault) is anything."""
+    known, rng, records = smooth_reducer(), np.random.default_rng(1), []
+    for k in range(2):
+        time = np.arange(12001) / 100.0
+        torque = SCALE * np.interp(time % 40.0, [0.0, 20.0, 40.0], [low, 1.0, low])
+        angle = known.angle_rad(time, torque) + 1e-6 * rng.standard_normal(time.size)
+        records.append(Record(f"{k}.csv", time, torque + 1e-5 * rng.standard_normal(time.size), angle, SCALE / 20.0, SCALE))
+    assert possible_starts(reduce_unit(Unit("one side", SCALE, tuple(records))))[0].offset == 0.0
 
 
 def test_a_wave_has_modes_with_and_without_it():
