@@ -127,7 +127,7 @@ class Search:
             known, weights = (best.log_scale, best.weights) if best else ({}, None)
             return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
 
-        best, share, own = about(distortion), 1.0, True
+        best, share = about(distortion), 1.0
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
@@ -139,9 +139,9 @@ class Search:
                 break
             tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best)
             if self._log_density(tried, best.log_scale) < here:
-                best, share, own = best if own else about(best.distortion, best), SHORTER * share, True
+                best, share = about(best.distortion, best), SHORTER * share
             else:
-                best, share, own = tried, min(MOST_LENGTHENED, 2.0 * share), False
+                best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
         return best
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
