@@ -50,8 +50,9 @@ independent units. `outside`, `second-outside` … `tenth-outside` are `studies/
 `studies/second_outside_bench.py` … `studies/tenth_outside_bench.py`, each written without sight of the package and run before
 it was looked at: they held .70, .86, .71, .84, .84, .91, .98, .82, .86 and .92 at 90 % then (of the ninth, its units of even
 number). What they showed was mended, but for the tenth. Rows of `outside` to `seventh-outside` are of the class before loops
-that are not congruent and friction in proportion to the load; those of `eighth-outside`, `ninth-outside`, `tenth-outside` and of
-the project's own benches (`studies/make_bench.py --units 60 --seed 101`) are of the present code. Where amplitudes differ from
+that are not congruent and friction in proportion to the load; those of `eighth-outside` (its first 15 clean units),
+`ninth-outside`, `tenth-outside` and of the project's own benches (`studies/make_bench.py --units 60 --seed 101`) are of the
+present code. Where amplitudes differ from
 record to record the truth is that of the rated torque, from the sixth on that of each record's own. Seven laws make the third,
 of which three (Duhem's and Dahl's, over half of its units) have no return-point memory and are not of the class; its truth is
 the loop without the reducer's own traces (slip, creep, a second clearance), which move the peak by 0.03 to 0.25 % and S by 0.5
