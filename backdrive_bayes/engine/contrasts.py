@@ -30,8 +30,8 @@ class Contrasts:
 
     ``gram`` (weights, weights), ``moment`` (weights,), ``total``; ``index`` numbers the group of a weight;
     ``samples`` is the number of independent contrasts. ``white`` (samples, weights) are the whitened columns and ``held`` what
-    the class, and whatever else is integrated, holds of them, of which the Gram matrices are made; ``log_volume`` is what a
-    further group that is integrated costs.
+    the class holds of them, of which the Gram matrices are made; where a further group is ``integrated`` they are those of the
+    whole, and ``log_volume`` is what that costs.
     """
 
     names: tuple[str, ...]
@@ -44,42 +44,37 @@ class Contrasts:
     white: np.ndarray
     held: np.ndarray
     log_volume: float = 0.0
+    integrated: Integrated | None = None
 
-    def integrated(self, name: str, scale: float) -> Integrated:
-        """A group whose weights of standard deviation ``scale`` are to be integrated as those of the class are."""
+    def beside(self, name: str, scale: float) -> Contrasts:
+        """The same without a group whose weights, of standard deviation ``scale``, are integrated as those of the class are."""
         of = self.index == self.names.index(name)
-        on, lower, seen = self._solved(np.where(of, scale, 0.0))
-        return Integrated(of, lower, scale * self.white[:, on], scale * self.held[:, on], scale, seen)
-
-    def beside(self, part: Integrated) -> Contrasts:
-        """The same without a group of its own that is integrated."""
-        rest = np.flatnonzero(~part.of)
-        across = part.across(part.scale * self.gram[np.ix_(part.of, rest)])
+        _, lower, seen = self._solved(np.where(of, scale, 0.0))
+        rest = np.flatnonzero(~of)
+        across = solve_triangular(lower, scale * self.gram[np.ix_(of, rest)], lower=True, check_finite=False)
         return replace(
             self,
             index=self.index[rest],
             gram=self.gram[np.ix_(rest, rest)] - across.T @ across,
-            moment=self.moment[rest] - across.T @ part.seen,
-            total=self.total - float(part.seen @ part.seen),
-            white=self.white[:, rest],
-            held=np.vstack([self.held[:, rest], across]),
-            log_volume=self.log_volume + float(np.log(np.diag(part.lower)).sum()),
+            moment=self.moment[rest] - across.T @ seen,
+            total=self.total - float(seen @ seen),
+            log_volume=float(np.log(np.diag(lower)).sum()),
+            integrated=Integrated(self, of, scale, lower, seen, across),
         )
 
-    def joined(self, more: Contrasts, part: Integrated) -> Contrasts:
-        """The same and ``more`` columns, made with the same linear model, of which the group that is integrated here holds too;
-        the last that are joined."""
-        beyond = part.across(part.white.T @ more.white - part.held.T @ more.held)
-        held = np.vstack([more.held, beyond])
-        across = self.white.T @ more.white - self.held.T @ held
+    def joined(self, first: int, more: Contrasts) -> Contrasts:
+        """The ``first`` columns and ``more``, made with the same linear model, of which what is integrated here holds too."""
+        part = self.integrated
+        every = part.whole.white.T @ more.white - part.whole.held.T @ more.held
+        beyond = solve_triangular(part.lower, part.scale * every[part.of], lower=True, check_finite=False)
+        across = (every[~part.of] - part.across.T @ beyond)[:first]
         return replace(
             self,
             names=(*self.names, *more.names),
-            index=np.r_[self.index, more.index + len(self.names)],
-            gram=np.block([[self.gram, across], [across.T, more.gram - beyond.T @ beyond]]),
-            moment=np.r_[self.moment, more.moment - beyond.T @ part.seen],
-            white=more.white[:, :0],
-            held=held[:, :0],
+            index=np.r_[self.index[:first], more.index + len(self.names)],
+            gram=np.block([[self.gram[:first, :first], across], [across.T, more.gram - beyond.T @ beyond]]),
+            moment=np.r_[self.moment[:first], more.moment - beyond.T @ part.seen],
+            integrated=None,
         )
 
     def log_marginal(self, scale, one_way: Sequence[int] = ()) -> float:
@@ -109,7 +104,7 @@ class Contrasts:
 
     def gains(self, scale, columns, sizes) -> np.ndarray:
         """Gain in log marginal likelihood of each member (members, width) of further ``columns`` whose weights have standard
-        deviations ``sizes``, beside weights of ``scale``; averaged over SIZES."""
+        deviations ``sizes``, beside the first weights, of ``scale``; averaged over SIZES."""
         whole = np.unique(columns)
         at = np.searchsorted(whole, columns)
         own, lower, seen = self._solved(scale)
@@ -145,19 +140,15 @@ class Contrasts:
 
 @dataclass(frozen=True, eq=False)
 class Integrated:
-    """A group of weights among contrasts, integrated: the Cholesky factor of their precision, their columns in units of their
-    standard deviation ``scale``, whitened and as the class holds them, and their scores; ``of`` (weights,) marks them."""
+    """A group of weights that is integrated: the ``whole`` of contrasts ``of`` which (weights,) it is, its standard deviation,
+    the Cholesky factor of its precision, its scores, and what it holds ``across`` the other columns."""
 
+    whole: Contrasts
     of: np.ndarray
-    lower: np.ndarray
-    white: np.ndarray
-    held: np.ndarray
     scale: float
+    lower: np.ndarray
     seen: np.ndarray
-
-    def across(self, products) -> np.ndarray:
-        """What the group holds of further columns, of its columns' scalar ``products`` with them."""
-        return solve_triangular(self.lower, products, lower=True, check_finite=False)
+    across: np.ndarray
 
 
 def make_contrasts(linear: Linear, groups: tuple[Group, ...]) -> Contrasts:

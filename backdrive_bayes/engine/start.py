@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def _oddest_offset(reduced) -> float:
             low, high = _compared(up, down, shift)
             inside = (TORQUES > low) & (TORQUES < high)
             read = TORQUES[inside] - shift
-            slope = np.interp(read, TORQUES, np.gradient(up.angle, TORQUES))
+            slope = np.interp(read, TORQUES, up.slope)
             weight = 1.0 / (reduced.context.angle_noise**2 + (reduced.context.torque_noise * slope) ** 2)
             apart = np.interp(read, TORQUES, up.angle) - np.interp(TORQUES[inside] + shift, TORQUES, down.angle)
             whole += float(np.sum(weight * (apart - np.average(apart, weights=weight)) ** 2))
@@ -87,13 +88,17 @@ class _Leg:
     angle: np.ndarray
     share: float
 
+    @cached_property
+    def slope(self) -> np.ndarray:
+        """Change of the angle with the torque, at TORQUES."""
+        return np.gradient(self.angle, TORQUES)
+
 
 def _legs(blocks, angle, scale: float) -> list[_Leg]:
-    """The legs of a record that span at least HALF of its range, but for the first, which the past decides."""
+    """The settled legs of a record that span at least HALF of its range."""
     found, span = [], np.abs(np.diff(blocks.turning_nm)) / np.ptp(blocks.turning_nm)
-    for k in range(1 if blocks.direction.size > 1 else 0, blocks.direction.size):
+    for k, sign, own in _settled_legs(blocks):
         if span[k] > HALF:
-            own, sign = blocks.leg == k, float(blocks.direction[k])
             z = np.maximum.accumulate(blocks.torque_nm[own] * sign) / scale
             found.append(_Leg(sign, z[0], z[-1], np.interp(TORQUES, z, angle[own] * sign), span[k]))
     return found
@@ -125,16 +130,20 @@ def _overlap(pair, shift: float) -> float:
     return high - low if high - low > LEAST * max(up.last - up.first, down.last - down.first) else 0.0
 
 
+def _settled_legs(blocks):
+    """Number, direction and blocks of every leg but the first, which the past decides, or of the only one."""
+    for k in range(1 if blocks.direction.size > 1 else 0, blocks.direction.size):
+        yield k, float(blocks.direction[k]), blocks.leg == k
+
+
 def _crossings(reduced):
     """Torque at LEVELS on every settled leg that spans most of the range, mirrored where it falls, with sign and record."""
     found = []
     for r, (blocks, angle) in enumerate(zip(reduced.blocks, reduced.angles, strict=True)):
-        legs = blocks.direction.size
-        settled = blocks.leg > 0 if legs > 1 else blocks.leg >= 0
+        settled = blocks.leg > 0 if blocks.direction.size > 1 else blocks.leg >= 0
         middle = angle - 0.5 * (angle[settled].max() + angle[settled].min())
-        for k in range(1 if legs > 1 else 0, legs):
+        for k, sign, own in _settled_legs(blocks):
             if abs(blocks.turning_nm[k + 1] - blocks.turning_nm[k]) > 1.2 * reduced.torque_scale_nm:
-                own, sign = blocks.leg == k, blocks.direction[k]
                 rising = np.maximum.accumulate(middle[own] * sign)
                 found.append((np.interp(LEVELS, rising, blocks.torque_nm[own] * sign / reduced.torque_scale_nm), sign, r))
     return found

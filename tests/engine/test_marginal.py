@@ -266,14 +266,14 @@ def test_a_group_that_is_integrated_first_weighs_as_among_the_others(problem):
         return Contrasts(some, index, gram, moment, data.total, data.samples, data.noise_dof, x, none)
 
     whole, few, more = made(np.arange(9)), made(np.arange(6)), made(np.arange(6, 9))
-    part, beside = few.integrated("group", 0.2), few.beside(few.integrated("group", 0.2))
+    beside = few.beside("group", 0.2)
     exact = whole.log_marginals(scale, np.arange(6, 9), size, [1])
-    joined = beside.joined(more, part)
+    joined = beside.joined(3, more)
     assert joined.log_marginals(np.repeat([1.0, 0.0], 3), np.arange(3, 6), size, [1]) == pytest.approx(exact)
-    alike = whole.beside(whole.integrated("group", 0.2))
+    alike = whole.beside("group", 0.2)
     assert alike.log_marginals(np.repeat([1.0, 0.0], 3), np.arange(3, 6), size, [1]) == pytest.approx(exact)
     assert beside.chi2(np.ones(3)) == pytest.approx(few.chi2(scale[:6]))
-    apart = beside.joined(more, replace(part, white=0.0 * part.white))
+    apart = replace(beside, integrated=replace(beside.integrated, scale=0.0)).joined(3, more)
     assert abs(apart.log_marginals(np.repeat([1.0, 0.0], 3), np.arange(3, 6), size, [1]) - exact) > 0.01
 
 
