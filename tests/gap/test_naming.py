@@ -10,7 +10,7 @@ from support.planted import LOOPS, MORE, NOISE, PERIOD_RAD, UNITS, VARIANTS, cha
 from backdrive_bayes.engine import periodic, reduced
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.traces import trace_levels
-from backdrive_bayes.gap import hypotheses
+from backdrive_bayes.gap import table
 from backdrive_bayes.gap import probabilities as gap
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
@@ -99,7 +99,7 @@ def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
     weighed = weigh(prepare(unit))
     assert next(iter(gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {})))) == "encoder_error"
     monkeypatch.setattr(periodic, "phases", lambda linear: 1)
-    monkeypatch.setattr(hypotheses, "phases", lambda linear: 1)
+    monkeypatch.setattr(table, "phases", lambda linear: 1)
     wrong = weigh(prepare(replace(unit, name="again")))
     assert wrong.log_factor[("encoder_error",)] < 0.6 * weighed.log_factor[("encoder_error",)]
 
