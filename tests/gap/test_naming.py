@@ -10,8 +10,8 @@ from support.planted import LOOPS, MORE, NOISE, PERIOD_RAD, UNITS, VARIANTS, cha
 from backdrive_bayes.engine import periodic, reduced
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.traces import trace_levels
-from backdrive_bayes.gap import table
 from backdrive_bayes.gap import probabilities as gap
+from backdrive_bayes.gap import table
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
 
