@@ -10,8 +10,9 @@ import numpy as np
 from backdrive_bayes.engine.design import Design, Group
 from backdrive_bayes.engine.linear import Linear
 
-FREQUENCIES = np.arange(0.25, 50.0, 0.125)
-"""Waves in one angle scale, from half a wave over the whole range; the spacing is a quarter of a wave over the range."""
+FREQUENCIES = np.arange(0.75, 50.0, 0.125)
+"""Waves in one angle scale, from one and a half over the whole range, or nothing repeats; the spacing is a quarter of a wave over
+the range."""
 WAVE, AMPLITUDE = "wave", 6e-3
 """Name of the wave's columns in a linear model, and a wave's usual amplitude in shares of the angle scale."""
 MOST_PHASES = 5

@@ -13,7 +13,7 @@ from backdrive_bayes.engine.jumps import Jumps
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group
 from backdrive_bayes.engine.traces import trace_levels, usual_level, wave_trace
-from backdrive_bayes.engine.unlisted import module_group, step_group, uneven_group
+from backdrive_bayes.engine.unlisted import bump_groups, module_group, ratchet_group, step_group, uneven_group
 from backdrive_bayes.mechanics.effect import TangentEffect
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 
@@ -21,9 +21,12 @@ ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
 WAVES = "waves"
 MODULE_CHANGE = 0.05
 """Usual change of a module in shares of itself."""
-KINDS = (UNEXPLAINED, "module_change", "uneven", "step", "line")
-"""What something unlisted may be: a process on each leg, a module that changes in time, legs of two directions that part, a step
-in time, a line in the spectrum of the noise; each as likely."""
+TOGETHER = (UNEXPLAINED, "module_change", "uneven", "ratchet", "shape")
+"""What something unlisted may be, of many weights together: a process on each leg, a module that changes in time, legs of two
+directions that part, a set that grows with the way, a shape in the angle."""
+ALONE = ("step", "bump")
+"""The same of one weight among many: a step in time, a bump in the angle. A line in the spectrum of the noise is the last; each
+kind is as likely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +62,8 @@ class Table:
         self.phases = phases(linear)
         self.coarse = coarse_bank(self.phases)
         self.linear = linear
-        unlisted = (path_group(linear.reduced, UNKNOWN), module_group(linear), uneven_group(linear), step_group(linear))
+        makers = (module_group, uneven_group, ratchet_group, step_group)
+        unlisted = (path_group(linear.reduced, UNKNOWN), *(make(linear) for make in makers), *bump_groups(linear))
         self.contrasts = make_contrasts(linear, (*effect_groups(linear), *unlisted, self._waves(self.coarse)))
         apart = [self.contrasts.names.index(n) for n in (UNEXPLAINED, WAVES)]
         # Beside the process on each leg; waves, of the coarse bank or about one of them, follow.
@@ -69,7 +73,7 @@ class Table:
         traces = trace_levels(linear.reduced, linear.design.joined(unlisted[0]), effects.values())
         self.trace = np.array([traces.get(n, 0.0) for n in self.names])
         usual = {e.name: usual_level(e, context, traces.get(e.name, 0.0)) for e in linear.effects}
-        usual |= {UNEXPLAINED: UNKNOWN.present(context), "module_change": MODULE_CHANGE, "uneven": AMPLITUDE}
+        usual |= {UNEXPLAINED: UNKNOWN.present(context), "module_change": MODULE_CHANGE} | dict.fromkeys(TOGETHER[2:], AMPLITUDE)
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
         self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
@@ -116,9 +120,9 @@ class Table:
             return self._of_terms(hypothesis, self._on(hypothesis))
         listed = tuple(n for n in hypothesis if n != UNEXPLAINED)
         on = self._on(listed)
-        kinds = [self._of_terms(hypothesis, on | {k}) for k in KINDS[:3]]
+        kinds = [self._of_terms(hypothesis, on | {k}) for k in TOGETHER]
         if ENCODER not in hypothesis:
-            kinds.append(self._with_step(on))
+            kinds += [self._with_one(name, on) for name in ALONE]
         kinds.append(self._of_terms(hypothesis, on) + self.line)
         return float(logsumexp(kinds) - np.log(len(kinds)))
 
@@ -178,10 +182,10 @@ class Table:
             self._nearby[at, level] = self._beside(level).joined(self.index.size, self._near[at])
         return self._nearby[at, level]
 
-    def _with_step(self, on) -> float:
-        """Log marginal likelihood averaged over all instants of a step."""
+    def _with_one(self, name, on) -> float:
+        """Log marginal likelihood averaged over which one of a group's weights is there."""
         contrasts = self._beside(self._unlisted(on))
-        columns = np.flatnonzero(self.index == self.names.index("step"))[:, None]
+        columns = np.flatnonzero(self.index == self.names.index(name))[:, None]
         gains = contrasts.gains(self.scale(on), columns, np.full(columns.shape, AMPLITUDE))
         at = int(np.argmax(gains))
         price = gains[at] - (logsumexp(gains) - np.log(gains.size))

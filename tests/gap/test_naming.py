@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.planted import LOOPS, MORE, NOISE, PERIOD_RAD, UNITS, VARIANTS, changed, planted, prepared, smooth_reducer
+from support.planted import LOOPS, MORE, NOISE, PERIOD_RAD, UNITS, UNLISTED, VARIANTS, changed, planted, prepared, smooth_reducer
 
 from backdrive_bayes.engine import periodic, reduced
 from backdrive_bayes.engine.infer import prepare
@@ -61,6 +61,20 @@ def test_other_forms_of_an_effect_are_named_with_nothing_beside(name):
     answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
     assert next(iter(answers)) == name and answers[name] > 0.4
     assert max(weighed.log_factor.values()) < weighed.log_factor[(name,)] + 2
+
+
+@pytest.mark.parametrize("name", UNLISTED)
+def test_what_is_unlisted_is_unknown_by_a_kind_of_its_own(name, monkeypatch):
+    """A planted fault: without the kind a listed effect stands for it."""
+    unit = UNLISTED[name]()
+    weighed = weigh(prepare(unit))
+    answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    assert next(iter(answers)) == "unknown" and answers["unknown"] > 0.6
+    for kinds in ("TOGETHER", "ALONE"):
+        monkeypatch.setattr(table, kinds, tuple(k for k in getattr(table, kinds) if k not in (name, "shape")))
+    wrong = weigh(prepare(replace(unit, name="again")))
+    assert wrong.log_factor[("unknown",)] < weighed.log_factor[("unknown",)] - 5
+    assert max(wrong.log_factor, key=wrong.log_factor.get) != ("unknown",)
 
 
 def test_teeth_that_leap_back_are_no_stick_slip():
