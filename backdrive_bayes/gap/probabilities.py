@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gamma, logsumexp
 
+from backdrive_bayes.gap.table import KINDS
+
 UNKNOWN, WAVE, STICK_SLIP = "unknown", "encoder_error", "stick_slip"
 
 
@@ -82,10 +84,17 @@ def _weights(log_factor, misfit, temperature, calibration) -> dict[tuple[str, ..
         # Something unlisted alone is due where no listed effect explains, not where none does.
         due = misfit[effects] if effects else least
         unlisted_prior = calibration.beside if effects else calibration.unlisted
-        explained = max(log_factor.get(more, value), value)
-        weight[more] = explained / temperature + prior + unlisted_prior + due
+        weight[more] = _of_kinds(log_factor.get(more, value), value, temperature) + prior + unlisted_prior + due
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
+
+
+def _of_kinds(log_factor, without, temperature) -> float:
+    """Log weight of something unlisted, whose ``log_factor`` is the mean over its kinds: one of them stands out, the others
+    explain as much as goes ``without``. Which one it is, is as likely before at every temperature."""
+    more = max(log_factor - without, 0.0)
+    one = without + more + np.log(KINDS - (KINDS - 1) * np.exp(-more))
+    return float(logsumexp([one / temperature, without / temperature], b=[1.0 / KINDS, 1.0 - 1.0 / KINDS]))
 
 
 def _misfits(log_factor, left, calibration) -> dict[tuple[str, ...], float]:

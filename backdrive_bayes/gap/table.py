@@ -27,6 +27,7 @@ directions that part, a set that grows with the way, a shape in the angle."""
 ALONE = ("step", "bump")
 """The same of one weight among many: a step in time, a bump in the angle. A line in the spectrum of the noise is the last; each
 kind is as likely."""
+KINDS = len(TOGETHER) + len(ALONE) + 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,14 @@
 """From log Bayes factors to probabilities: what more evidence, more misfit and a second name do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backdrive_bayes.gap.probabilities import CALIBRATION, credible_set, labels, log_prior, probabilities, unlisted
+from backdrive_bayes.gap.probabilities import CALIBRATION, credible_set, labels, log_misfit, log_prior, probabilities, unlisted
+from backdrive_bayes.gap.table import KINDS
 
 FACTORS = st.floats(-30.0, 1e4)
 
@@ -66,6 +69,18 @@ def test_a_property_beside_another_effect_has_the_prior_of_a_second_one(bayes_fa
     joint = answer(given_factors(lag=1e4, both=1e4), properties={"slip": odds / (1.0 + odds)})
     second = np.exp(log_prior(("lag", "slip"), CALIBRATION) - log_prior(("lag",), CALIBRATION))
     assert joint[("lag", "slip")] / joint[("lag",)] == pytest.approx(bayes_factor * second)
+
+
+def test_what_kind_something_unlisted_is_keeps_its_odds_however_hot():
+    """Two names whose best model explains as much: that of one kind among many keeps the odds of one among many."""
+    listed, kinds = 400.0, 400.0 - np.log(KINDS)
+    log = given_factors(lag=listed, unknown=kinds) | {("lag", "unknown"): listed}
+    for warm in (0.0, 2.0, 20.0):
+        calibration = replace(CALIBRATION, warm=warm, unlisted=0.0, single=0.0)
+        joint = probabilities(log, {h: 1.0 for h in log if "unknown" not in h}, {}, calibration)
+        due = np.exp(log_misfit(1.0, CALIBRATION.spread))
+        # The hotter, the more the other kinds count, and no effect at all.
+        assert 0.999 * due / KINDS < joint[("unknown",)] / joint[("lag",)] < (due / KINDS) * (1.1 if warm <= 2.0 else 8.0)
 
 
 def test_what_teeth_leave_does_not_speak_for_something_unlisted():
