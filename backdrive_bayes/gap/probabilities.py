@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import exp, log
 
 import numpy as np
 from scipy.special import gamma, logsumexp
@@ -29,15 +30,15 @@ class Calibration:
     90 % set must gather.
     """
 
-    cool: float = 1.0
-    warm: float = 1.89
-    single: float = -3.36
-    second: float = -3.58
-    wave: float = -2.0
-    unlisted: float = -2.3
-    beside: float = -2.7
+    cool: float = 0.86
+    warm: float = 1.3
+    single: float = -2.88
+    second: float = -3.26
+    wave: float = -1.4
+    unlisted: float = -1.91
+    beside: float = -2.59
     spread: float = 0.355
-    cover: float = 0.923
+    cover: float = 0.92
 
 
 CALIBRATION = Calibration()
@@ -93,8 +94,8 @@ def _of_kinds(log_factor, without, temperature) -> float:
     """Log weight of something unlisted, whose ``log_factor`` is the mean over its kinds: one of them stands out, the others
     explain as much as goes ``without``. Which one it is, is as likely before at every temperature."""
     more = max(log_factor - without, 0.0)
-    one = without + more + np.log(KINDS - (KINDS - 1) * np.exp(-more))
-    return float(logsumexp([one / temperature, without / temperature], b=[1.0 / KINDS, 1.0 - 1.0 / KINDS]))
+    one = (more + log(KINDS - (KINDS - 1) * exp(-more))) / temperature
+    return without / temperature + one + log(1.0 / KINDS + (1.0 - 1.0 / KINDS) * exp(-one))
 
 
 def _misfits(log_factor, left, calibration) -> dict[tuple[str, ...], float]:
