@@ -30,15 +30,15 @@ class Calibration:
     90 % set must gather.
     """
 
-    cool: float = 0.86
-    warm: float = 1.3
-    single: float = -2.88
-    second: float = -3.26
-    wave: float = -1.4
-    unlisted: float = -1.91
-    beside: float = -2.59
+    cool: float = 1.0
+    warm: float = 1.89
+    single: float = -3.36
+    second: float = -3.58
+    wave: float = -2.0
+    unlisted: float = -1.8
+    beside: float = -2.7
     spread: float = 0.355
-    cover: float = 0.92
+    cover: float = 0.923
 
 
 CALIBRATION = Calibration()
