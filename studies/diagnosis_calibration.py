@@ -31,11 +31,13 @@ SETS = 0.9
 """Coverage that credible sets are to have."""
 FLOOR = 1e-3
 """Probability below which a log score counts no further."""
-UNSEEN = """The defaults were set on rows of an earlier class, with `unlisted` raised for the odds of its kinds, which are
-no longer coarsened. Those set on all rows here have a mean log score better by 0.03 over all 483 units, the eleventh bench's among
-them, but call fewer clean units none (0.89 against 0.93) and name fewer units exactly (0.68 against 0.69). Only the calibration numbers are set on the other benches, in a search that begins at round numbers. Thresholds of
-properties, trace levels, the lowest frequency of a wave, the kinds of what is unlisted and the terms themselves were developed
-with units of all these benches in view: no bench here is wholly unseen.
+UNSEEN = """The defaults were set on rows of an earlier class, with `unlisted` raised for the odds of its kinds, which are no longer
+coarsened. Those set on all rows here have a mean log score better by 0.03 over all 483 units, the eleventh bench's among them,
+but call fewer clean units none (0.89 against 0.93) and name no more units exactly (0.68 against 0.69).
+
+Only the calibration numbers are set on the other benches, in a search that begins at round numbers. Thresholds of properties,
+trace levels, the lowest frequency of a wave, the kinds of what is unlisted and the terms themselves were developed with units of
+all these benches in view: no bench here is wholly unseen.
 
 `foreign` are labelled units of a bench whose code is not here (foreign-1 and every second unit of set 1). `contact`, `mujoco`,
 `ode` and `sliders` are every second unit of this project's four benches (`studies/make_bench.py --units 60 --seed 101`).

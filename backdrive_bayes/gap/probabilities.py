@@ -35,7 +35,7 @@ class Calibration:
     single: float = -3.36
     second: float = -3.58
     wave: float = -2.0
-    unlisted: float = -1.8
+    unlisted: float = -1.9
     beside: float = -2.7
     spread: float = 0.355
     cover: float = 0.923
