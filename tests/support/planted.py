@@ -182,9 +182,9 @@ VARIANTS = {
 
 
 def _set(record):
-    """A ratchet: every passage beyond two thirds of full torque, either way, leaves a little."""
-    share = np.abs(record.torque_nm) / SCALE
-    return 4e-3 * np.cumsum(np.maximum(share - 0.67, 0.0) * np.abs(np.diff(share, prepend=share[0])))
+    """A ratchet: every passage beyond two thirds of full torque leaves a little."""
+    share = record.torque_nm / SCALE
+    return 5e-3 * np.cumsum(np.maximum(share - 0.67, 0.0) * np.abs(np.diff(share, prepend=share[0])))
 
 
 def _bump(record, height, at, width):
@@ -193,7 +193,7 @@ def _bump(record, height, at, width):
 
 
 UNLISTED = {
-    "ratchet": lambda: changed(_smooth(), lambda r, i: _set(r)),
+    "ratchet": lambda: changed(_smooth(loops=MORE), lambda r, i: _set(r)),
     "bump": lambda: changed(_smooth(), lambda r, i: _bump(r, 6e-4, 0.4, 0.05)),
     "shape": lambda: changed(_smooth(), lambda r, i: 4e-4 * np.cos(2.4 * np.pi * r.angle_rad / np.ptp(r.angle_rad))),
 }
