@@ -11,7 +11,7 @@ from backdrive_bayes.engine.linear import Linear
 NODES = np.linspace(-0.98, 0.98, 50)
 """Torques at which legs of the two directions may part."""
 PARTS = np.linspace(-1.0, 1.0, 9)
-"""Ends of the parts of the torque's range that may each leave a set of its own."""
+"""Ends of the parts of the torque's range that may each leave a set of its own: small enough to tell tips from the middle."""
 PLACES = np.linspace(-1.0, 1.0, 41)
 """Angles of bumps, in shares of half the range: closer than the narrowest is wide."""
 WIDTHS = (0.05, 0.1, 0.2)

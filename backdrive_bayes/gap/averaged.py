@@ -13,7 +13,8 @@ from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.periodic import with_wave
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import probabilities
-from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, UNEXPLAINED, Weighed, weigh
+from backdrive_bayes.gap.hypotheses import Weighed, weigh
+from backdrive_bayes.gap.table import ENCODER, STICK_SLIP, UNEXPLAINED
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 from backdrive_bayes.records.record import Unit

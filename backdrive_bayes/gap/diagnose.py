@@ -14,8 +14,9 @@ from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap import next_test, probabilities, where
 from backdrive_bayes.gap.averaged import posterior_of
 from backdrive_bayes.gap.examine import LEVEL, Found, examine
-from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed
+from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.parameters import effect_parameters
+from backdrive_bayes.gap.table import ENCODER, STICK_SLIP
 from backdrive_bayes.indicators.draws import IndicatorDraws
 from backdrive_bayes.indicators.intervals import central
 from backdrive_bayes.mechanics.reducer import BASELINE

@@ -13,9 +13,10 @@ from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.gap import probabilities, where
 from backdrive_bayes.gap.averaged import weighed_unit, with_columns
-from backdrive_bayes.gap.hypotheses import STICK_SLIP, Weighed
+from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.properties import Property, find_properties
 from backdrive_bayes.gap.shrink import Fitted, Shrink, fit_hypothesis, shrink, within_reach
+from backdrive_bayes.gap.table import STICK_SLIP
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.records.record import Unit
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.engine.posterior import Posterior
-from backdrive_bayes.gap.hypotheses import ENCODER, STICK_SLIP, Weighed
+from backdrive_bayes.gap.hypotheses import Weighed
+from backdrive_bayes.gap.table import ENCODER, STICK_SLIP
 from backdrive_bayes.indicators.intervals import central
 from backdrive_bayes.mechanics.effect import PathEffect, TangentEffect
 from backdrive_bayes.mechanics.registry import all_effects

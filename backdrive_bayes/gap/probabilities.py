@@ -15,9 +15,7 @@ from math import exp, log
 import numpy as np
 from scipy.special import gamma, logsumexp
 
-from backdrive_bayes.gap.table import KINDS
-
-UNKNOWN, WAVE, STICK_SLIP = "unknown", "encoder_error", "stick_slip"
+from backdrive_bayes.gap.table import ENCODER, KINDS, STICK_SLIP, UNEXPLAINED
 
 
 @dataclass(frozen=True)
@@ -77,11 +75,11 @@ def _weights(log_factor, misfit, temperature, calibration) -> dict[tuple[str, ..
     """Probability of every set of effects and of the same with something unlisted beside, without the operator's properties."""
     weight, least = {}, min(misfit.values())
     for effects, value in log_factor.items():
-        if UNKNOWN in effects:
+        if UNEXPLAINED in effects:
             continue
         prior = log_prior(effects, calibration)
         weight[effects] = value / temperature + prior
-        more = tuple(sorted((*effects, UNKNOWN)))
+        more = tuple(sorted((*effects, UNEXPLAINED)))
         # Something unlisted alone is due where no listed effect explains, not where none does.
         due = misfit[effects] if effects else least
         unlisted_prior = calibration.beside if effects else calibration.unlisted
@@ -92,7 +90,8 @@ def _weights(log_factor, misfit, temperature, calibration) -> dict[tuple[str, ..
 
 def _of_kinds(log_factor, without, temperature) -> float:
     """Log weight of something unlisted, whose ``log_factor`` is the mean over its kinds: one of them stands out, the others
-    explain as much as goes ``without``. Which one it is, is as likely before at every temperature."""
+    explain as much as goes ``without``. Which one it is, is as likely before at every temperature (beside an encoder error two
+    kinds fewer are weighed, which is left out of account)."""
     more = max(log_factor - without, 0.0)
     one = (more + log(KINDS - (KINDS - 1) * exp(-more))) / temperature
     return without / temperature + one + log(1.0 / KINDS + (1.0 - 1.0 / KINDS) * exp(-one))
@@ -134,21 +133,21 @@ def _beside(joint, name, probability, calibration):
 def log_prior(effects: tuple[str, ...], calibration: Calibration) -> float:
     """Log prior weight of a set of listed effects relative to none."""
     weight = calibration.single * bool(effects) + calibration.second * max(len(effects) - 1, 0)
-    return weight + calibration.wave * (WAVE in effects)
+    return weight + calibration.wave * (ENCODER in effects)
 
 
 def labels(joint: Mapping[tuple[str, ...], float]) -> dict[str, float]:
     """Probabilities by the name of an answer, likeliest first: where something unlisted acts beside an effect, all is unknown."""
-    found: dict[str, float] = {"none": 0.0, UNKNOWN: 0.0}
+    found: dict[str, float] = {"none": 0.0, UNEXPLAINED: 0.0}
     for effects, p in joint.items():
-        name = UNKNOWN if UNKNOWN in effects else "+".join(effects) or "none"
+        name = UNEXPLAINED if UNEXPLAINED in effects else "+".join(effects) or "none"
         found[name] = found.get(name, 0.0) + p
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 def unlisted(joint: Mapping[tuple[str, ...], float]) -> float:
     """Probability that something acts which no listed effect explains."""
-    return min(float(sum(p for effects, p in joint.items() if UNKNOWN in effects)), 1.0)
+    return min(float(sum(p for effects, p in joint.items() if UNEXPLAINED in effects)), 1.0)
 
 
 def credible_set(answers: Mapping[str, float], cover: float = CALIBRATION.cover) -> list[str]:

@@ -25,9 +25,9 @@ TOGETHER = (UNEXPLAINED, "module_change", "uneven", "ratchet", "shape")
 """What something unlisted may be, of many weights together: a process on each leg, a module that changes in time, legs of two
 directions that part, a set that grows with the way, a shape in the angle."""
 ALONE = ("step", "bump")
-"""The same of one weight among many: a step in time, a bump in the angle. A line in the spectrum of the noise is the last; each
-kind is as likely."""
+"""The same of one weight among many: a step in time, a bump in the angle."""
 KINDS = len(TOGETHER) + len(ALONE) + 1
+"""Number of kinds of what is unlisted, a line in the spectrum of the noise the last; each is as likely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,8 @@ class Table:
         traces = trace_levels(linear.reduced, linear.design.joined(unlisted[0]), effects.values())
         self.trace = np.array([traces.get(n, 0.0) for n in self.names])
         usual = {e.name: usual_level(e, context, traces.get(e.name, 0.0)) for e in linear.effects}
-        usual |= {UNEXPLAINED: UNKNOWN.present(context), "module_change": MODULE_CHANGE} | dict.fromkeys(TOGETHER[2:], AMPLITUDE)
+        usual |= {UNEXPLAINED: UNKNOWN.present(context), "module_change": MODULE_CHANGE}
+        usual |= {"uneven": AMPLITUDE, "ratchet": AMPLITUDE, "shape": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
         self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}

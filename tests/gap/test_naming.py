@@ -65,7 +65,8 @@ def test_other_forms_of_an_effect_are_named_with_nothing_beside(name):
 
 @pytest.mark.parametrize("name", UNLISTED)
 def test_what_is_unlisted_is_unknown_by_a_kind_of_its_own(name, monkeypatch):
-    """It is likelier than all names together. A planted fault: without the kind a listed effect stands for it."""
+    """It is likelier than all names together. A planted fault: without the kind, and shapes that could draw it, a listed effect
+    stands for it."""
     unit = UNLISTED[name]()
     weighed = weigh(prepare(unit))
     answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
