@@ -65,9 +65,14 @@ def local_cluster():
 
 @pytest.fixture
 def two_workers(local_cluster):
-    """The same client, with both workers there whatever an earlier test did to them."""
-    local_cluster.wait_for_workers(2, timeout=60)
+    """The same client, with both workers there whatever an earlier test did to them, by their keepers and by the scheduler."""
+    assert until(lambda: set(at_work(local_cluster)) <= set(local_cluster.nthreads()) and len(at_work(local_cluster)) == 2)
     return local_cluster
+
+
+def at_work(client):
+    """Addresses of the workers whose keepers run."""
+    return [k.worker_address for k in list(client.cluster.workers.values()) if k.status.name == "running"]
 
 
 @pytest.fixture
@@ -295,7 +300,7 @@ def test_workers_that_are_given_up_are_started_anew(two_workers):
     for keeper in given_up:
         two_workers.cluster.sync(keeper.close)
     assert len(given_up) == 2 and not any(keeper.status.name == "running" for keeper in given_up)
-    assert until(lambda: sum(keeper.status.name == "running" for keeper in list(keepers.values())) == 2)
+    assert until(lambda: len(at_work(two_workers)) == 2)
     assert not set(given_up) & set(keepers.values())
     two_workers.wait_for_workers(2, timeout=30)
 
