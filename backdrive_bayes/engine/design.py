@@ -20,11 +20,15 @@ from backdrive_bayes.mechanics.effect import (
     TangentEffect,
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
+from backdrive_bayes.mechanics.effects.sensor_lag import behind
 from backdrive_bayes.mechanics.history import LEAST_RANGE, History, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
+UNDISTORTED = Distortion()
 STEP = 2e-5
 """Step of the difference quotients by offset and lag."""
+LAG_STEP = 0.01
+"""The same by a first-order lag, in shares of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,34 +136,39 @@ def class_priors(reducer: ReducerClass) -> dict[str, tuple[float, float]]:
     return {p.name: p.log_scale for p in reducer.parts}
 
 
-def path_group(reduced: Reduced, effect: PathEffect) -> Group:
-    """Columns of an effect that follows from the torque history; its prior scale is its own."""
+def path_group(reduced: Reduced, effect: PathEffect, distortion: Distortion = UNDISTORTED) -> Group:
+    """Columns of an effect that follows from the torque history, as the reducer felt it; its prior scale is its own."""
     columns = []
-    for r, history in enumerate(histories(reduced, Distortion())):
+    for r, history in enumerate(histories(reduced, distortion)):
         columns.append(history.mean(*effect.responses(history, r, reduced.context)))
     return Group(effect.name, tuple(columns), effect.per_record)
 
 
-def tangent_groups(reduced, reducer, design: Design, distortion, weights, effects: tuple[Effect, ...]) -> tuple[Group, ...]:
-    """Columns made of the class's prediction with ``weights``: derivatives by the parameter of every tangent effect that can be
-    told, and even counterparts."""
-    base, groups, growths = design.predict(weights), [], []
+def tangent_groups(reduced, reducer, design: Design, distortion, known, effects: tuple[Effect, ...]) -> tuple[Group, ...]:
+    """Columns made of the class's prediction with its weights, and the share of a lag that smooths, out of ``known`` ones:
+    derivatives by the parameter of every tangent effect that can be told, and even counterparts."""
+    weights = {name: known[name] for name in design.names}
+    base, groups, growths, late = design.predict(weights), [], [], []
     grown = grown_histories(reduced, distortion)
     for effect in effects:
         if isinstance(effect, FlankEffect):
             groups.append(Group(effect.name, tuple(reducer.flank_columns(h, weights, growth) for h, growth in grown)))
         if isinstance(effect, SpreadEffect):
-            groups.append(Group(effect.name, _spread(reduced, reducer, distortion, weights, base)))
+            smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
+            share = float(known[effect.name][0]) if effect.name in known else 0.0
+            # What is smoothed grows with the lag as well.
+            groups[-1] = _columns(groups[-1].name, [by + share * more for by, more in zip(late, growth, strict=True)])
+            groups.append(_columns(effect.name, smoothed))
         if effect is BENCH_HYSTERESIS:
-            late = next(g for g in groups if g.name == "sensor_lag")
             # A lag moves the torque by rate times lag, friction of the bench by the same amount at every rate.
-            groups.append(Group(effect.name, tuple(c / rate for c, rate in zip(late.columns, reduced.context.rate, strict=True))))
+            groups.append(_columns(effect.name, [by / rate for by, rate in zip(late, reduced.context.rate, strict=True)]))
         if isinstance(effect, GrowthEffect):
             growths.append(effect)
         elif isinstance(effect, TangentEffect):
             moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + STEP})
-            there = class_prediction(reduced, reducer, moved, weights)
-            groups.append(Group(effect.name, tuple(((a - b) / STEP)[:, None] for a, b in zip(there, base, strict=True))))
+            by = [(a - b) / STEP for a, b in zip(class_prediction(reduced, reducer, moved, weights), base, strict=True)]
+            late = by if effect.parameter == "lag_s" else late
+            groups.append(_columns(effect.name, by))
     for part in (0, 1):
         groups += _growth_groups(reduced, reducer, grown, weights, [e for e in growths if e.part == part])
     return tuple(groups)
@@ -179,20 +188,28 @@ def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
         for (history, growth), law in zip(grown, laws([history for history, _ in grown]), strict=True)
         if identified
     ]
-    return [Group(e.name, tuple(c[:, None] for c in of)) for e, of in zip(identified, zip(*columns, strict=True), strict=True)]
+    return [_columns(e.name, of) for e, of in zip(identified, zip(*columns, strict=True), strict=True)]
 
 
-DELAYS, SHARES = np.polynomial.laguerre.laggauss(3)
-"""Delays, in shares of their mean, that together make a first-order lag (Gauss-Laguerre nodes)."""
+def _columns(name: str, of) -> Group:
+    """A group of one column, (blocks,) in each record."""
+    return Group(name, tuple(column[:, None] for column in of))
 
 
-def _spread(reduced, reducer, distortion, weights, base):
-    """Prediction behind a first-order lag less that behind a pure delay of the same mean; nothing for a lag below the noise."""
-    if abs(distortion.lag_s) * reduced.context.rate.max() < 0.5 * reduced.context.torque_noise:
-        return tuple(np.zeros((b.size, 1)) for b in base)
-    found = [-b for b in base]
-    for delay, share in zip(DELAYS, SHARES, strict=True):
-        moved = replace(distortion, lag_s=delay * distortion.lag_s)
-        late = class_prediction(reduced, reducer, moved, weights)
-        found = [f + share * a for f, a in zip(found, late, strict=True)]
-    return tuple(f[:, None] for f in found)
+def _smoothing(reduced, reducer, distortion, weights, base, delayed):
+    """Prediction behind a first-order lag less that behind a pure delay of the same mean, and its derivative by the mean, one
+    array (blocks,) a record each; nothing for a lag below the noise. ``delayed`` is the derivative of the latter."""
+    lag = distortion.lag_s
+    if lag * reduced.context.rate.max() < 0.5 * reduced.context.torque_noise:
+        return [np.zeros(b.size) for b in base], [np.zeros(b.size) for b in base]
+    found, growth = [], []
+    prompt = grown_histories(reduced, replace(distortion, lag_s=0.0))
+    for (history, grown), pure, by in zip(prompt, base, delayed, strict=True):
+        angle = reducer.along(history, weights, grown)
+        late, later = (
+            history.mean(*(end[:, None] for end in behind(angle, history.t0, history.t1, mean)))[:, 0]
+            for mean in (lag, (1.0 + LAG_STEP) * lag)
+        )
+        found.append(late - pure)
+        growth.append((later - late) / (LAG_STEP * lag) - by)
+    return found, growth

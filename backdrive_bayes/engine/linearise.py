@@ -65,7 +65,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     one where none of them acts, and those of each and of each pair without the others; all may have the class and noise of the
     likeliest. A hypothesis is weighed about the mode where it is likeliest.
     """
-    free, starts = Search.over(reduced, effects, modules), possible_starts(reduced)
+    free, starts = Search(reduced, effects, modules), possible_starts(reduced)
     joint, waves, frequency = joint_mode(free, starts)
     context = joint.reduced.context
     late = max(start.lag_s for start in starts)

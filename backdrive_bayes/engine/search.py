@@ -59,13 +59,8 @@ class Search:
     reduced: Reduced
     effects: tuple[Effect, ...]
     modules: tuple[str, ...]
-    fixed: tuple[Group, ...]
+    fixed: tuple[Group, ...] = ()
     only: tuple[str, ...] | None = None
-
-    @classmethod
-    def over(cls, reduced: Reduced, effects: tuple[Effect, ...], modules: tuple[str, ...]) -> Search:
-        """The search where every effect may act; what follows from the torque history is made once."""
-        return cls(reduced, effects, modules, tuple(path_group(reduced, e) for e in effects if isinstance(e, PathEffect)))
 
     def learn(self, distortion: Distortion, *near: Distortion) -> Linear:
         """The linear model about the highest mode that is reached from a distortion, or from those ``near``, with a class, jitter
@@ -117,7 +112,7 @@ class Search:
         """The linear model about the mode that is reached from a distortion, of the class and jitter of ``like``, and of its
         noise where both are of the same block means: a step is taken where it raises the log density of the nonlinear parameters,
         else it is shortened. A straight line promises more than there is, or less. Its derivatives are those at the weights of
-        the model before, at its own where a step from there was refused."""
+        the model before, at its own where a step from there was refused, so that the last model need not be the highest."""
         context, covariances = self.reduced.context, like.covariances
         if self.reduced is not like.reduced:
             covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
@@ -127,11 +122,12 @@ class Search:
             known, weights = (best.log_scale, best.weights) if best else ({}, None)
             return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
 
-        best, share = about(distortion), 1.0
+        best, share, passed = about(distortion), 1.0, []
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
-                best = about(best.distortion, best)
+                best, passed = about(best.distortion, best), []
+            passed.append(best)
             moved = self._moved(best)
             apart = length(moved, best.distortion, context)
             here = self._log_density(best, best.log_scale)
@@ -142,7 +138,7 @@ class Search:
                 best, share = about(best.distortion, best), SHORTER * share
             else:
                 best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
-        return best
+        return max(best, *passed, key=lambda linear: self._log_density(linear, linear.log_scale))
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
         """Log density of the data and a distortion, by default its own, at known log scales, up to a constant."""
@@ -165,11 +161,13 @@ class Search:
     def _linear(self, reducer, distortion, covariances, known, jitter, idle, weights=None):
         """The linear model about a distortion; derivatives are those at ``weights``, by default the ones that fit best there."""
         core = class_groups(self.reduced, reducer, distortion)
+        paths = (path_group(self.reduced, effect, distortion) for effect in self.effects if isinstance(effect, PathEffect))
+        beside = (*paths, *self.fixed)
         if weights is None:
-            plain = core.joined(*self.fixed)
+            plain = core.joined(*beside)
             weights = plain.split(self._solve(reducer, plain, self.reduced.angles, covariances, known)[2].mean)
-        tangents = tangent_groups(self.reduced, reducer, core, distortion, {n: weights[n] for n in core.names}, self.effects)
-        design = core.joined(*self.fixed, *tangents)
+        tangents = tangent_groups(self.reduced, reducer, core, distortion, weights, self.effects)
+        design = core.joined(*beside, *tangents)
         shift = _shift(design, distortion, self.effects, self.reduced.context)
         angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
         data, log_scale, solution = self._solve(reducer, design, angles, covariances, known, idle)

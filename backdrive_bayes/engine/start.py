@@ -25,7 +25,7 @@ USUAL = np.array([0.2, 1.0])
 
 def possible_starts(reduced: Reduced) -> list[Distortion]:
     """Distortions worth starting from: with the offset alone, with a lag, with a drag exponent, with both."""
-    crossings, context, offset = _crossings(reduced), reduced.context, _oddest_offset(reduced)
+    context, crossings, offset = reduced.context, _crossings(reduced), _oddest_offset(reduced)
     if len(crossings) < 3:
         return [Distortion(offset)]
     record = np.array([r for _, _, r in crossings])

@@ -73,6 +73,11 @@ class ReducerClass:
         """The same at the end of every segment."""
         return {p.name: p.mix(_cells(p, growth).ends(history)) for p in self.parts}
 
+    def along(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
+        """Response (segments,) at the segments' ends at independent ``weights`` by part."""
+        found = (_response(_cells(p, growth), history, p.weights(weights[p.name]), True) for p in self.parts)
+        return sum(found, np.zeros(()))
+
     def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
         columns = (_response(_cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)

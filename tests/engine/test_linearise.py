@@ -301,7 +301,7 @@ def test_an_angle_that_stands_still_is_one_clear_line():
 @pytest.fixture(scope="module")
 def searching():
     """The search of a unit with an offset and what was learnt of its class and noise."""
-    free = search.Search.over(reduce_unit(planted(offset_nm=-3e-4)), library_terms(), BASELINE)
+    free = search.Search(reduce_unit(planted(offset_nm=-3e-4)), library_terms(), BASELINE)
     return free, free.learn(Distortion())
 
 
@@ -343,7 +343,7 @@ def test_modes_are_compared_in_the_class_of_the_likeliest(searching):
 @pytest.mark.parametrize("options", [{"offset_nm": 8e-4}, {"lag_s": 0.03, "loops": MORE}])
 def test_a_search_ends_where_its_own_straight_line_leads_nowhere(options):
     """Of a mode without what distorts, which misfits: there the prior scales with the noise, or good steps are refused."""
-    free = search.Search.over(reduce_unit(planted(**options)), library_terms(), BASELINE)
+    free = search.Search(reduce_unit(planted(**options)), library_terms(), BASELINE)
     ended = replace(free, only=()).find_mode(free.learn(Distortion()), Distortion())
     offset, wanted = ended.distortion.offset, ended.weights["torque_offset"][0]
     assert abs(wanted - offset) < 2e-4 + 0.1 * abs(offset)

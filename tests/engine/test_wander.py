@@ -32,7 +32,7 @@ def wandering(size: float, time: float = TIME, seed: int = 3):
 def learnt(size: float):
     """The unit, with what was learnt and the gain."""
     reduced = wandering(size)
-    return learn_wander(Search.over(reduced, library_terms(), BASELINE).learn(Distortion()))
+    return learn_wander(Search(reduced, library_terms(), BASELINE).learn(Distortion()))
 
 
 def test_a_planted_wander_is_learnt_at_its_size_and_time():

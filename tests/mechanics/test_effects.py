@@ -77,8 +77,14 @@ def column(name, reduced, distortion=None):
     distortion = distortion or LATE.get(name, Distortion())
     if isinstance(TERMS[name], PathEffect):
         return [c[:, of_path(TERMS[name])] for c in path_group(reduced, TERMS[name]).columns]
+    return tangents(reduced, distortion, weights(), name)[name]
+
+
+def tangents(reduced, distortion, known, name):
+    """Columns by record of every tangent term that belongs with one, by name."""
+    terms = next(terms for terms in registry.LIBRARY.values() if TERMS[name] in terms)
     core = class_groups(reduced, REDUCER, distortion)
-    return tangent_groups(reduced, REDUCER, core, distortion, weights(), (TERMS[name],))[0].columns
+    return {g.name: g.columns for g in tangent_groups(reduced, REDUCER, core, distortion, known, terms)}
 
 
 @pytest.mark.parametrize("name", TERMS)

@@ -148,7 +148,7 @@ def prepared(name):
 
 def joint_mode(reduced, effects):
     """The first of the modes of ``linearise``; the others, of each bending effect alone, are not searched."""
-    return engine.joint_mode(Search.over(reduced, effects, BASELINE), engine.possible_starts(reduced))[0].without(WAVE)
+    return engine.joint_mode(Search(reduced, effects, BASELINE), engine.possible_starts(reduced))[0].without(WAVE)
 
 
 def _firmer(known, factor):

@@ -1,5 +1,8 @@
 """The angle channel is late against the torque channel."""
 
+import numba
+import numpy as np
+
 from backdrive_bayes.mechanics.effect import SpreadEffect, TangentEffect
 
 
@@ -36,3 +39,20 @@ class LagSpread(SpreadEffect):
 LAG_SPREAD = LagSpread(
     "lag_spread", "rate independence", "steps are rounded", "step response of a first-order lag", "1", False, False
 )
+
+
+@numba.njit(cache=True, nogil=True)
+def behind(angle, t0, t1, lag_s):
+    """Output of a first-order lag at both ends of every segment, two of (segments,), for an input that is ``angle`` (segments,)
+    at the segments' ends [any unit] and straight between them; it has caught up with the first."""
+    begin, end = np.empty(angle.size), np.empty(angle.size)
+    x = y = angle[0]
+    for i in range(angle.size):
+        begin[i] = y
+        span = (t1[i] - t0[i]) / lag_s
+        if span > 0.0:
+            slope = (angle[i] - x) / span
+            y = angle[i] - slope + (y - x + slope) * np.exp(-span)
+        x = angle[i]
+        end[i] = y
+    return begin, end
