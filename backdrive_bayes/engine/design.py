@@ -199,17 +199,16 @@ def _columns(name: str, of) -> Group:
 def _smoothing(reduced, reducer, distortion, weights, base, delayed):
     """Prediction behind a first-order lag less that behind a pure delay of the same mean, and its derivative by the mean, one
     array (blocks,) a record each; nothing for a lag below the noise. ``delayed`` is the derivative of the latter."""
-    lag = distortion.lag_s
-    if lag * reduced.context.rate.max() < 0.5 * reduced.context.torque_noise:
+    if distortion.lag_s * reduced.context.rate.max() < 0.5 * reduced.context.torque_noise:
         return [np.zeros(b.size) for b in base], [np.zeros(b.size) for b in base]
     found, growth = [], []
     prompt = grown_histories(reduced, replace(distortion, lag_s=0.0))
     for (history, grown), pure, by in zip(prompt, base, delayed, strict=True):
-        angle = reducer.along(history, weights, grown)
+        mean, end = reducer.along(history, weights, grown)
         late, later = (
-            history.mean(*(end[:, None] for end in behind(angle, history.t0, history.t1, mean)))[:, 0]
-            for mean in (lag, (1.0 + LAG_STEP) * lag)
+            np.bincount(history.block, history.weight * behind(mean, end, history.t0, history.t1, lag), history.blocks)
+            for lag in (distortion.lag_s, (1.0 + LAG_STEP) * distortion.lag_s)
         )
         found.append(late - pure)
-        growth.append((later - late) / (LAG_STEP * lag) - by)
+        growth.append((later - late) / (LAG_STEP * distortion.lag_s) - by)
     return found, growth

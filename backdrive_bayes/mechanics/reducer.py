@@ -9,7 +9,7 @@ knots.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -73,10 +73,12 @@ class ReducerClass:
         """The same at the end of every segment."""
         return {p.name: p.mix(_cells(p, growth).ends(history)) for p in self.parts}
 
-    def along(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
-        """Response (segments,) at the segments' ends at independent ``weights`` by part."""
-        found = (_response(_cells(p, growth), history, p.weights(weights[p.name]), True) for p in self.parts)
-        return sum(found, np.zeros(()))
+    def along(self, history: History, weights, growth=(0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
+        """Means on the segments and values at their ends, two of (segments,), at independent ``weights`` by part."""
+        count = history.z0.size
+        each = replace(history, block=np.arange(count), weight=np.ones(count), blocks=count)
+        ends = (_response(_cells(p, growth), history, p.weights(weights[p.name]), True) for p in self.parts)
+        return self.predict(each, weights, growth), sum(ends, np.zeros(()))
 
     def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""

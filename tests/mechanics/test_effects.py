@@ -1,9 +1,11 @@
 """Every registered effect: shapes, levels, and the symmetry that it claims to break."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from support.bench import path_of
 
 from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
@@ -20,6 +22,7 @@ from backdrive_bayes.mechanics.effect import (
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import SIZE as BENCH_FRICTION
+from backdrive_bayes.mechanics.effects.sensor_lag import behind
 from backdrive_bayes.mechanics.effects.viscoelastic_creep import BEFORE
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.part import TOP
@@ -220,6 +223,88 @@ def test_tangents_are_derivatives_of_the_prediction():
             # Both on the settled legs: from the first sample on, a shifted history begins elsewhere.
             away = columns[30:, 0] - quotient[30:]
             assert np.sqrt(np.mean(away**2)) < 0.05 * np.abs(quotient[30:]).max(), name
+
+
+def test_a_first_order_lag_is_exact():
+    """Of a ramp that halts between two segments, in long segments and short ones: it runs behind by the rate times the lag, then
+    closes up exponentially."""
+    lag = 0.4
+
+    def late(time):
+        """Integral of the output up to an instant."""
+        running = np.minimum(time, 2.0)
+        first = 0.5 * running**2 - lag * running + lag**2 * -np.expm1(-running / lag)
+        gap = lag * -np.expm1(-2.0 / lag)
+        rest = np.maximum(time - 2.0, 0.0)
+        return first + 2.0 * rest - gap * lag * -np.expm1(-rest / lag)
+
+    for time in (np.linspace(0.0, 3.0, 4), np.linspace(0.0, 3.0, 31), np.linspace(0.0, 3.0, 3_001)):
+        before, end = np.r_[0.0, time[:-1]], np.minimum(time, 2.0)
+        mean = 0.5 * (end + np.minimum(before, 2.0))
+        span = np.maximum(time - before, 1e-300)
+        np.testing.assert_allclose(behind(mean, end, before, time, lag)[1:], (np.diff(late(time)) / span[1:]), atol=1e-9)
+
+
+def test_a_lag_knows_of_a_jump_within_a_segment():
+    """By the mean: a straight line between the same ends would be far from the exponential."""
+    lag, time = 0.4, np.array([0.0, 0.4, 0.8])
+    before, end = np.r_[0.0, time[:-1]], np.array([0.0, 1.0, 1.0])
+    late = 0.36
+    exact = (0.4 - lag * (np.exp(-(0.4 - late) / lag) - np.exp(-(0.8 - late) / lag))) / 0.4
+    jumped, straight = (behind(np.array([0.0, mean, 1.0]), end, before, time, lag)[2] for mean in (0.1, 0.5))
+    assert abs(jumped - exact) < 0.1 * abs(straight - exact)
+
+
+def test_the_lag_is_the_derivative_of_what_is_delayed_and_what_is_smoothed():
+    """Against a difference quotient of the prediction of which a share is behind a first-order lag and the rest delayed; the
+    delay alone, as if nothing were smoothed, would miss it."""
+    reduced, share, lag, step = unit(), 0.8, 0.05, 1e-3
+
+    def predicted(at):
+        smoothed = tangents(reduced, at, weights(), "lag_spread")["lag_spread"]
+        delayed = class_groups(reduced, REDUCER, at).predict(weights())
+        return [d + share * s[:, 0] for d, s in zip(delayed, smoothed, strict=True)]
+
+    below, above = (predicted(Distortion(lag_s=lag + sign * step)) for sign in (-1.0, 1.0))
+    known = weights() | {"lag_spread": np.array([share])}
+    both, alone = (tangents(reduced, Distortion(lag_s=lag), of, "sensor_lag")["sensor_lag"] for of in (known, weights()))
+    for r, (low, high) in enumerate(zip(below, above, strict=True)):
+        quotient = (high - low) / (2.0 * step)
+        off, without = (np.sqrt(np.mean((columns[r][:, 0] - quotient)[30:] ** 2)) for columns in (both, alone))
+        assert off < 0.15 * np.abs(quotient[30:]).max() and off < 0.5 * without
+
+
+def test_what_is_smoothed_is_what_a_filter_makes_of_the_prediction():
+    """A first-order filter in small steps of time; nothing of it is there without a lag."""
+    reduced, lag = unit(rates=(1.0,)), 0.06
+    core = class_groups(reduced, REDUCER, Distortion())
+    angle, blocks = core.predict(weights())[0], reduced.blocks[0]
+    time = np.linspace(blocks.begin_s[0], blocks.end_s[-1], 200_001)
+    share = -np.expm1(-(time[1] - time[0]) / lag)
+    middle = 0.5 * (blocks.begin_s + blocks.end_s)
+    filtered = lfilter([share], [1.0, share - 1.0], np.interp(time, middle, angle) - angle[0]) + angle[0]
+    late = Distortion(lag_s=lag)
+    delayed = class_groups(reduced, REDUCER, late).predict(weights())[0]
+    found = delayed + tangents(reduced, late, weights(), "lag_spread")["lag_spread"][0][:, 0]
+    off = (found - np.interp(middle, time, filtered))[5:]
+    assert np.abs(off).max() < 0.01 * np.ptp(angle) < 0.1 * np.abs(found - delayed).max() * 10.0
+    assert not tangents(reduced, Distortion(), weights(), "lag_spread")["lag_spread"][0].any()
+
+
+@pytest.mark.parametrize("name", [n for n in PATHS if n in ("asymmetric_stiffness", "viscoelastic_creep")])
+def test_an_effect_of_the_reducer_follows_the_torque_that_the_reducer_felt(name):
+    """A torque that was read too high by an offset makes the same columns where the offset is known."""
+    shift, right, wrong = 0.2, unit(), unit()
+    read = tuple(
+        replace(b, torque_nm=b.torque_nm - 0.1 * shift, turning_nm=b.turning_nm - 0.1 * shift, path_nm=b.path_nm - 0.1 * shift)
+        for b in right.blocks
+    )
+    wrong.blocks = read
+    for here, known, blind in zip(
+        *(path_group(u, TERMS[name], Distortion(at)).columns for u, at in ((right, 0.0), (wrong, shift), (wrong, 0.0))), strict=True
+    ):
+        np.testing.assert_allclose(known, here, atol=1e-9)
+        assert np.abs(blind - here).max() > 0.01 * np.abs(here).max()
 
 
 def test_every_term_is_of_one_known_kind():

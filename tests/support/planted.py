@@ -47,6 +47,7 @@ def planted(
     known=None,
     offset_nm=0.0,
     lag_s=0.0,
+    smooth_s=0.0,
     exponent=0.0,
     jitter=None,
     loops=LOOPS,
@@ -54,7 +55,7 @@ def planted(
     **options,
 ) -> Unit:
     """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque, friction
-    follows the rate over 0.05 N·m/s with ``exponent``."""
+    follows the rate over 0.05 N·m/s with ``exponent``, the angle is behind a delay or a first-order lag of ``smooth_s``."""
     known = known or physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | options))
     rng, records = np.random.default_rng(seed + 20), []
     for amplitude, rate in loops:
@@ -62,6 +63,9 @@ def planted(
         angle = _firmer(known, (rate / 0.05) ** exponent).angle_rad(time, torque)
         if jitter:
             angle = _jittered(torque, angle, *jitter, rng)
+        if smooth_s:
+            share = -np.expm1(-1.0 / (HERTZ * smooth_s))
+            angle = angle[0] + lfilter([share], [1.0, share - 1.0], angle - angle[0])
         angle = np.interp(time - lag_s, time, angle) + angle_noise(time.size, 1 / HERTZ, noise, rng)
         read = torque - offset_nm + noise.torque_nm * rng.standard_normal(time.size)
         records.append(Record(f"rate-{rate:g}-amplitude-{amplitude:g}.csv", time, read, angle, rate, amplitude))

@@ -5,6 +5,9 @@ import numpy as np
 
 from backdrive_bayes.mechanics.effect import SpreadEffect, TangentEffect
 
+SHORT = 1e-4
+"""Segment, in shares of the lag, along which its output hardly moves."""
+
 
 class SensorLag(TangentEffect):
     """The loop's width grows with rate times slope: late is one way, an angle ahead of the torque is no lag."""
@@ -42,17 +45,22 @@ LAG_SPREAD = LagSpread(
 
 
 @numba.njit(cache=True, nogil=True)
-def behind(angle, t0, t1, lag_s):
-    """Output of a first-order lag at both ends of every segment, two of (segments,), for an input that is ``angle`` (segments,)
-    at the segments' ends [any unit] and straight between them; it has caught up with the first."""
-    begin, end = np.empty(angle.size), np.empty(angle.size)
-    x = y = angle[0]
-    for i in range(angle.size):
-        begin[i] = y
+def behind(mean, end, t0, t1, lag_s):
+    """Mean on every segment (segments,) of the output of a first-order lag whose input has these means and, at the segments' ends,
+    these values [any unit], a parabola between; it has caught up with the first."""
+    out = np.empty(mean.size)
+    x = y = end[0]
+    for i in range(mean.size):
         span = (t1[i] - t0[i]) / lag_s
-        if span > 0.0:
-            slope = (angle[i] - x) / span
-            y = angle[i] - slope + (y - x + slope) * np.exp(-span)
-        x = angle[i]
-        end[i] = y
-    return begin, end
+        if span < SHORT:
+            out[i] = y
+            y += span * (mean[i] - y)
+        else:
+            bend = -6.0 * (mean[i] - 0.5 * (x + end[i])) / span
+            slope = (end[i] - x) / span - bend
+            steady = x - slope + 2.0 * bend / span
+            new = end[i] - slope - 2.0 * bend + 2.0 * bend / span + (y - steady) * np.exp(-span)
+            out[i] = mean[i] - (new - y) / span
+            y = new
+        x = end[i]
+    return out
