@@ -72,6 +72,16 @@ def test_starts_hold_the_offset_to_the_torque_noise_and_the_mode_more_closely(of
     assert joint_mode(reduced, library_terms()).distortion.offset == pytest.approx(offset_nm / SCALE, abs=2e-4)
 
 
+def test_a_lag_that_smooths_is_found():
+    """All of a first-order lag of 60 ms, 6 % of the torque at the fastest rate, is smoothed; where the derivative is that of a
+    delay the search ends at 47 ms."""
+    reduced = reduce_unit(planted(smooth_s=0.06, loops=MORE))
+    alone = search.Search(reduced, library_terms(), BASELINE, only=("sensor_lag",))
+    found = alone.learn(Distortion(lag_s=0.05))
+    assert found.distortion.lag_s == pytest.approx(0.06, abs=4e-3)
+    assert found.weights["lag_spread"][0] == pytest.approx(1.0, abs=0.15)
+
+
 def test_one_start_holds_the_lag():
     starts = possible_starts(reduce_unit(planted(lag_s=0.02)))
     assert min(abs(s.lag_s - 0.02) for s in starts) < 2e-3 and starts[0].lag_s == 0.0

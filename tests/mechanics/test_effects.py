@@ -300,9 +300,9 @@ def test_an_effect_of_the_reducer_follows_the_torque_that_the_reducer_felt(name)
         for b in right.blocks
     )
     wrong.blocks = read
-    for here, known, blind in zip(
-        *(path_group(u, TERMS[name], Distortion(at)).columns for u, at in ((right, 0.0), (wrong, shift), (wrong, 0.0))), strict=True
-    ):
+    cases = ((right, 0.0), (wrong, shift), (wrong, 0.0))
+    by_case = (path_group(reduced, TERMS[name], Distortion(at)).columns for reduced, at in cases)
+    for here, known, blind in zip(*by_case, strict=True):
         np.testing.assert_allclose(known, here, atol=1e-9)
         assert np.abs(blind - here).max() > 0.01 * np.abs(here).max()
 

@@ -46,8 +46,8 @@ LAG_SPREAD = LagSpread(
 
 @numba.njit(cache=True, nogil=True)
 def behind(mean, end, t0, t1, lag_s):
-    """Mean on every segment (segments,) of the output of a first-order lag whose input has these means and, at the segments' ends,
-    these values [any unit], a parabola between; it has caught up with the first."""
+    """Mean on every segment (segments,) of the output of a first-order lag of ``lag_s`` [s] whose input has these means and, at
+    the segments' ends, these values [any unit], a parabola between; it has caught up with the first. Times are in seconds."""
     out = np.empty(mean.size)
     x = y = end[0]
     for i in range(mean.size):
