@@ -122,15 +122,15 @@ class Search:
             known, weights = (best.log_scale, best.weights) if best else ({}, None)
             return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
 
-        best, share, passed = about(distortion), 1.0, []
+        best, share, highest = about(distortion), 1.0, (-np.inf, None)
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
-                best, passed = about(best.distortion, best), []
-            passed.append(best)
+                best, highest = about(best.distortion, best), (-np.inf, None)
             moved = self._moved(best)
             apart = length(moved, best.distortion, context)
             here = self._log_density(best, best.log_scale)
+            highest = max(highest, (here, best), key=lambda passed: passed[0])
             if share * (self._log_density(best, best.log_scale, moved) - here) < STILL:
                 break
             tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best)
@@ -138,7 +138,7 @@ class Search:
                 best, share = about(best.distortion, best), SHORTER * share
             else:
                 best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
-        return max(best, *passed, key=lambda linear: self._log_density(linear, linear.log_scale))
+        return best if self._log_density(best, best.log_scale) > highest[0] else highest[1]
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
         """Log density of the data and a distortion, by default its own, at known log scales, up to a constant."""
