@@ -20,8 +20,7 @@ from backdrive_bayes.mechanics.effect import (
     TangentEffect,
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.effects.sensor_lag import behind
-from backdrive_bayes.mechanics.history import LEAST_RANGE, History, of_blocks
+from backdrive_bayes.mechanics.history import LEAST_RANGE, History, behind, of_blocks
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
 UNDISTORTED = Distortion()

@@ -130,7 +130,7 @@ class Search:
             moved = self._moved(best)
             apart = length(moved, best.distortion, context)
             here = self._log_density(best, best.log_scale)
-            highest = max(highest, (here, best), key=lambda passed: passed[0])
+            highest = (here, best) if here >= highest[0] else highest
             if share * (self._log_density(best, best.log_scale, moved) - here) < STILL:
                 break
             tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best)
@@ -138,7 +138,7 @@ class Search:
                 best, share = about(best.distortion, best), SHORTER * share
             else:
                 best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
-        return best if self._log_density(best, best.log_scale) > highest[0] else highest[1]
+        return best if self._log_density(best, best.log_scale) >= highest[0] else highest[1]
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
         """Log density of the data and a distortion, by default its own, at known log scales, up to a constant."""

@@ -17,6 +17,8 @@ RESTING = 0.05
 LEAST_RANGE = 0.05
 """Range of a logarithm of rate or amplitude, and of what a law makes of it, below which it counts as one value: nothing is learnt
 of the law from it."""
+SHORT = 1e-4
+"""Segment, in shares of the lag, along which its output hardly moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,4 +132,26 @@ def played(first, z1, threshold):
     for i in range(z1.size):
         x = min(max(x, z1[i] - threshold), z1[i] + threshold)
         out[i + 1] = x
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def behind(mean, end, t0, t1, lag_s):
+    """Mean on every segment (segments,) of the output of a first-order lag of ``lag_s`` [s] whose input has these means and, at
+    the segments' ends, these values [any unit], a parabola between; it has caught up with the first. Times are in seconds."""
+    out = np.empty(mean.size)
+    x = y = end[0]
+    for i in range(mean.size):
+        span = (t1[i] - t0[i]) / lag_s
+        if span < SHORT:
+            out[i] = y
+            y += span * (mean[i] - y)
+        else:
+            bend = -6.0 * (mean[i] - 0.5 * (x + end[i])) / span
+            slope = (end[i] - x) / span - bend
+            steady = x - slope + 2.0 * bend / span
+            new = end[i] - slope - 2.0 * bend + 2.0 * bend / span + (y - steady) * np.exp(-span)
+            out[i] = mean[i] - (new - y) / span
+            y = new
+        x = end[i]
     return out

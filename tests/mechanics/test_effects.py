@@ -22,9 +22,8 @@ from backdrive_bayes.mechanics.effect import (
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import SIZE as BENCH_FRICTION
-from backdrive_bayes.mechanics.effects.sensor_lag import behind
 from backdrive_bayes.mechanics.effects.viscoelastic_creep import BEFORE
-from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.history import behind, through
 from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.records.reduction import Blocks
