@@ -26,8 +26,6 @@ from backdrive_bayes.mechanics.reducer import ReducerClass
 UNDISTORTED = Distortion()
 STEP = 2e-5
 """Step of the difference quotients by offset and lag."""
-LAG_STEP = 0.01
-"""The same by a first-order lag, in shares of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +153,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
             share = float(known[effect.name][0]) if effect.name in known else 0.0
-            # What is smoothed grows with the lag as well.
+            # What is smoothed grows with the lag as well, whose column is the one before.
             groups[-1] = _columns(groups[-1].name, [by + share * more for by, more in zip(late, growth, strict=True)])
             groups.append(_columns(effect.name, smoothed))
         if effect is BENCH_HYSTERESIS:
@@ -180,7 +178,7 @@ def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
         rates = zip(reduced.context.log_rate, along, strict=True)
         return [reduced.context.law(rate + history.surge, history.log_amplitude) for rate, history in rates]
 
-    read = laws(histories(reduced, Distortion()))
+    read = laws(histories(reduced, UNDISTORTED))
     identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in read])) > LEAST_RANGE]
     columns = [
         reducer.grown(history, weights, growth, identified[0].part, [law[e.term] for e in identified])
@@ -206,8 +204,8 @@ def _smoothing(reduced, reducer, distortion, weights, base, delayed):
         mean, end = reducer.along(history, weights, grown)
         late, later = (
             np.bincount(history.block, history.weight * behind(mean, end, history.t0, history.t1, lag), history.blocks)
-            for lag in (distortion.lag_s, (1.0 + LAG_STEP) * distortion.lag_s)
+            for lag in (distortion.lag_s, distortion.lag_s + STEP)
         )
         found.append(late - pure)
-        growth.append((later - late) / (LAG_STEP * distortion.lag_s) - by)
+        growth.append((later - late) / STEP - by)
     return found, growth

@@ -135,6 +135,14 @@ def played(first, z1, threshold):
     return out
 
 
+@numba.njit(cache=True, inline="always")
+def lagged(before, first, last, bend, span):
+    """Output of a first-order lag at the end of a segment of ``span`` lags, ``before`` at its beginning; the input goes from
+    ``first`` to ``last``, straight but for ``bend`` span² (its curvature in lags, halved)."""
+    slope = (last - first) / span - bend * span
+    return last - slope - 2.0 * bend * span + 2.0 * bend + (before - first + slope - 2.0 * bend) * np.exp(-span)
+
+
 @numba.njit(cache=True, nogil=True)
 def behind(mean, end, t0, t1, lag_s):
     """Mean on every segment (segments,) of the output of a first-order lag of ``lag_s`` [s] whose input has these means and, at
@@ -147,10 +155,7 @@ def behind(mean, end, t0, t1, lag_s):
             out[i] = y
             y += span * (mean[i] - y)
         else:
-            bend = -6.0 * (mean[i] - 0.5 * (x + end[i])) / span
-            slope = (end[i] - x) / span - bend
-            steady = x - slope + 2.0 * bend / span
-            new = end[i] - slope - 2.0 * bend + 2.0 * bend / span + (y - steady) * np.exp(-span)
+            new = lagged(y, x, end[i], -6.0 * (mean[i] - 0.5 * (x + end[i])) / span**2, span)
             out[i] = mean[i] - (new - y) / span
             y = new
         x = end[i]

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from backdrive_bayes.mechanics.effect import PathEffect
-from backdrive_bayes.mechanics.history import played
+from backdrive_bayes.mechanics.history import lagged, played
 
 TIMES = 8
 ALIKE, ALIKE_BEFORE = 1.5, 6.0
@@ -68,8 +68,7 @@ def _delayed(z0, z1, span, time):
     x = z0[0]
     for i in range(z0.size):
         begin[i] = x
-        slope = (z1[i] - z0[i]) / span[i]
-        x = z1[i] - slope * time + (x - z0[i] + slope * time) * np.exp(-span[i] / time)
+        x = lagged(x, z0[i], z1[i], 0.0, span[i] / time)
         end[i] = x
     return begin, end
 
