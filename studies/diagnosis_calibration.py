@@ -63,6 +63,7 @@ def weigh_unit(folder: Path, truth: dict) -> dict:
         "effects": truth["effects"],
         "severity": truth["size"],
         "log_factor": {"+".join(h): round(v, 2) for h, v in found.weighed.log_factor.items()},
+        "leaps": {"+".join(h): round(v, 2) for h, v in found.weighed.leaps.items()},
         "left": {"+".join(h): round(v, 3) for h, v in found.weighed.left.items()},
         "properties": {p.name: round(p.probability, 4) for p in found.properties},
         "named": "+".join(found.named) or "none",
@@ -94,7 +95,7 @@ def read_benches(home: Path = HOME) -> dict[str, list[dict]]:
     for path in sorted(home.glob("*.json")):
         name = "foreign" if path.stem in ("set-1", "foreign-1") else path.stem
         for row in json.loads(path.read_text()).values():
-            benches.setdefault(name, []).append(row | {k: _by_set(row[k]) for k in ("log_factor", "left") if k in row})
+            benches.setdefault(name, []).append(row | {k: _by_set(row[k]) for k in ("log_factor", "leaps", "left") if k in row})
     return benches
 
 
@@ -108,7 +109,7 @@ def answers(row: dict, calibration: Calibration) -> dict[str, float]:
     if "error" in row:
         return {"none": 0.0, "unknown": 0.0}
 
-    found = labels(probabilities(row["log_factor"], row["left"], row["properties"], calibration))
+    found = labels(probabilities(row["log_factor"], row["leaps"], row["left"], row["properties"], calibration))
     likeliest = next(iter(found))
     return moved_to_unknown(found, likeliest) if row.get("unsupported") and row["named"] == likeliest else found
 

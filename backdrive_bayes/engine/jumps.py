@@ -1,7 +1,7 @@
 """Stick-slip: a sawtooth of the angle in the direction of motion, looked for in the samples themselves.
 
 Between leaps the angle hangs behind, at a leap it catches up. Noise, vibration and an encoder's error have no such arrow: teeth
-the other way round are weighed against it.
+the other way round are weighed against it. So is a trace of teeth, as of every effect.
 """
 
 from __future__ import annotations
@@ -14,26 +14,31 @@ from scipy.special import logsumexp
 
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import HARMONICS
-from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
+from backdrive_bayes.engine.sawtooth import Noise, Series, fit_noise, tooth_gain
+from backdrive_bayes.engine.traces import TRACE
 
 STEEP = 6.0
 """Slopes beyond so many times the median are clearances being crossed: nothing is looked for there."""
 SAMPLES = 4
 """Samples in a correlation time of the noise, fewest samples in a tooth, and fewest teeth in a leg."""
-HEIGHTS = (0.5, 1.0, 1.6, 2.5)
-"""Heights of the teeth in spreads of the residuals that are averaged over; teeth without noise have 2.7."""
 RATIO = 1.35
-"""Ratio of the lengths that are averaged over, about the spread of a tooth's length."""
+"""Ratio of the lengths that are averaged over, about the spread of a tooth's length, and of the heights."""
+HEIGHTS = 0.5 * RATIO ** np.arange(6)
+"""Heights of the teeth in spreads of the residuals that are averaged over; teeth without noise have 2.7."""
+TRACES = np.arange(0.5, 2.5, 0.5)
+"""Sizes of a trace in its standard deviation that are averaged over, normal; larger ones are rare."""
 SHORTEST_RUN = 20
 """Samples between steep places from which teeth can be told from a slow trend, of degree ``TREND``."""
 TREND = 3
+SAWTOOTH = np.sqrt(12.0)
+"""Height of a sawtooth in its root mean square."""
 SEEN = 0.5
 """Share of contacts that stick whose teeth are high and long enough to be seen: a reading without teeth excludes no others."""
 
 
 @dataclass(frozen=True)
 class Jumps:
-    """Log Bayes factor of teeth ahead over noise or teeth the other way, and the usual size of a leap [rad]."""
+    """Log Bayes factor of teeth ahead over noise, teeth the other way or a trace of teeth, and the usual size of a leap [rad]."""
 
     log_factor: float
     size_rad: float
@@ -64,7 +69,9 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
         width = max(1, round(noise.correlation_time_s / SAMPLES / step))
         series = even_series(rest * blocks.direction[blocks.leg[block]], leg, width)
         if series is not None:
-            found.append(Teeth(series, width * step * float(reduced.context.rate[r])))
+            rate = float(reduced.context.rate[r])
+            # Correlated noise as it was estimated holds the teeth themselves.
+            found.append(Teeth(series, width * step * rate, TRACE * noise.white_rad))
     return found
 
 
@@ -102,16 +109,18 @@ def even_series(signed, leg, width: int) -> Series | None:
 
 @dataclass(frozen=True, eq=False)
 class Teeth:
-    """One record's residuals; ``step`` is the torque between its samples in shares of the largest."""
+    """One record's residuals; ``step`` is the torque between its samples in shares of the largest, ``trace_rad`` the root mean
+    square of a trace of teeth."""
 
     series: Series
     step: float
+    trace_rad: float
 
     @cached_property
     def levels(self) -> list:
         """The series, its means of two, four, ... samples, and the noise of each."""
         found, series = [], self.series
-        while self._longest(series) >= SAMPLES:
+        while _longest(series) >= SAMPLES:
             found.append((series, fit_noise(series)))
             series = series.halved()
         return found
@@ -119,23 +128,41 @@ class Teeth:
     @property
     def lengths(self) -> tuple[float, float]:
         """Shortest and longest torque between leaps that can be seen."""
-        return SAMPLES * self.step, self._longest(self.series) * self.step
+        return SAMPLES * self.step, _longest(self.series) * self.step
 
     def gain(self, length: float, side: int) -> tuple[float, float]:
         """Log Bayes factor of teeth of a length in torque over noise, and the leaps' size [rad]."""
         if not self.lengths[0] <= length <= self.lengths[1]:
             return 0.0, 0.0
+        series, noise, samples = self._level(length)
+        found = _gains(series, noise, side * HEIGHTS, samples)
+        return _averaged(found), float(HEIGHTS[int(np.argmax(np.max(found, axis=0)))] * noise.scale)
+
+    def trace(self, length: float) -> float:
+        """Log Bayes factor of a trace of such teeth over noise."""
+        if not self.lengths[0] <= length <= self.lengths[1]:
+            return 0.0
+        series, noise, samples = self._level(length)
+        found = _gains(series, noise, SAWTOOTH * self.trace_rad / noise.scale * TRACES, samples)
+        weight = np.exp(-0.5 * TRACES**2)
+        return float(logsumexp(found, b=weight / weight.sum() / len(found)))
+
+    def _level(self, length: float):
+        """The finest means in which a tooth has few samples, their noise, and the samples of a tooth."""
         samples, level = length / self.step, 0
         while samples >= 4 * SAMPLES and level + 1 < len(self.levels):
             samples, level = samples / 2, level + 1
-        series, noise = self.levels[level]
-        found = [[tooth_gain(series, noise, m, side * h, samples) for h in HEIGHTS] for m in (noise.memory, noise.memory**2)]
-        best = HEIGHTS[int(np.argmax(np.max(found, axis=0)))] * noise.scale
-        return _averaged(found), best
+        return *self.levels[level], samples
 
-    @staticmethod
-    def _longest(series: Series) -> float:
-        return np.diff(np.r_[np.flatnonzero(series.fresh), series.value.size]).max() / SAMPLES
+
+def _longest(series: Series) -> float:
+    """Samples of the longest teeth."""
+    return np.diff(np.r_[np.flatnonzero(series.fresh), series.value.size]).max() / SAMPLES
+
+
+def _gains(series: Series, noise: Noise, heights, samples: float) -> list[list[float]]:
+    """Log likelihoods of teeth over noise by the noise's memory and the teeth's height in its spreads."""
+    return [[tooth_gain(series, noise, m, h, samples) for h in heights] for m in (noise.memory, noise.memory**2)]
 
 
 def weigh_teeth(records: list[Teeth]) -> Jumps:
@@ -147,8 +174,9 @@ def weigh_teeth(records: list[Teeth]) -> Jumps:
     ahead, back = (np.array([[t.gain(x, side) for t in records] for x in lengths]) for side in (1, -1))
     total = ahead[:, :, 0].sum(axis=1)
     best = ahead[int(np.argmax(total))]
-    against = np.logaddexp(0.0, _averaged(back[:, :, 0].sum(axis=1))) - np.log(2.0)
-    seen = _averaged(total) - float(against)
+    trace = _averaged([sum(t.trace(x) for t in records) for x in lengths])
+    against = _averaged([0.0, _averaged(back[:, :, 0].sum(axis=1)), trace])
+    seen = _averaged(total) - against
     return Jumps(float(np.logaddexp(np.log(1.0 - SEEN), np.log(SEEN) + seen)), float(best[int(np.argmax(best[:, 0])), 1]))
 
 

@@ -65,7 +65,7 @@ def tooth_gain(series: Series, noise: Noise, memory: float, height: float, lengt
 
     ``height`` in spreads of the values, ``length`` in samples; a negative height makes the angle creep ahead and leap back.
     """
-    value = np.sign(height) * series.value / noise.scale
+    value = np.copysign(1.0, height) * series.value / noise.scale
     return _toothed(value, series.fresh, memory, noise.innovation, abs(height), length, _holds(length)) - noise.log_likelihood
 
 

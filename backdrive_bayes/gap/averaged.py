@@ -12,7 +12,6 @@ from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.periodic import with_wave
 from backdrive_bayes.engine.posterior import Posterior
-from backdrive_bayes.gap import probabilities
 from backdrive_bayes.gap.hypotheses import Weighed, weigh
 from backdrive_bayes.gap.table import ENCODER, STICK_SLIP, UNEXPLAINED
 from backdrive_bayes.mechanics.reducer import BASELINE
@@ -47,7 +46,7 @@ def fit_posterior(unit: Unit, modules=BASELINE, seed: int = 0, note=lambda text:
     """Posterior of a unit, averaged over what may break the symmetries of its class, the model discrepancy included."""
     with one_thread():
         weighed = weighed_unit(unit, tuple(modules), None, note)
-        joint = probabilities.probabilities(weighed.log_factor, weighed.left, {})
+        joint = weighed.joint()
         likeliest = sorted(joint.items(), key=lambda item: -item[1])[:MOST]
         mode = weighed.of(likeliest[0][0])
         kept = [(h, p) for h, p in likeliest if p >= LEAST * likeliest[0][1] and weighed.of(h) is mode]

@@ -11,7 +11,7 @@ from scipy.special import expit
 from backdrive_bayes.engine.levels import OFF, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.one_thread import one_thread
-from backdrive_bayes.gap import probabilities, where
+from backdrive_bayes.gap import where
 from backdrive_bayes.gap.averaged import weighed_unit, with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.properties import Property, find_properties
@@ -37,7 +37,7 @@ def examine(unit: Unit, *, baseline=BASELINE, seed=0, allowed=None, k=0.03, prog
     weighed = weighed_unit(unit, BASELINE, allowed, progress)
     withheld = _withheld(weighed.linear, baseline)
     properties = tuple(p for p in find_properties(weighed, rng) if allowed is None or p.name in allowed)
-    joint = probabilities.probabilities(weighed.log_factor, weighed.left, {p.name: p.probability for p in properties})
+    joint = weighed.joint({p.name: p.probability for p in properties})
     joint = _with_modules(joint, withheld)
     progress("where it lies and how far it shrinks")
     return Found(unit, weighed, properties, joint, withheld, rng, k, baseline, allowed, seed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +13,7 @@ from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import with_wave
 from backdrive_bayes.engine.reduced import disturbance
+from backdrive_bayes.gap.probabilities import probabilities
 from backdrive_bayes.gap.table import ENCODER, STICK_SLIP, UNEXPLAINED, Table
 from backdrive_bayes.mechanics.registry import all_effects
 
@@ -23,6 +25,7 @@ class Weighed:
     linears: tuple[Linear, ...]
     mode: dict[tuple[str, ...], int]
     log_factor: dict[tuple[str, ...], float]
+    leaps: dict[tuple[str, ...], float]
     frequency: dict[tuple[str, ...], float]
     jumps: Jumps
     left: dict[tuple[str, ...], float]
@@ -33,6 +36,10 @@ class Weighed:
     def linear(self) -> Linear:
         """The linear model about the mode of the best hypothesis."""
         return self.of(max(self.log_factor, key=self.log_factor.__getitem__))
+
+    def joint(self, properties: Mapping[str, float] | None = None) -> dict[tuple[str, ...], float]:
+        """Probability of every set of effects; ``properties`` are those of effects inside the class, each taken alone."""
+        return probabilities(self.log_factor, self.leaps, self.left, properties or {})
 
     def of(self, effects: tuple[str, ...]) -> Linear:
         """The linear model about the mode where a hypothesis is most likely."""
@@ -73,6 +80,7 @@ def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
         tuple(linears),
         mode,
         {h: f.log_marginal - none for h, f in found.items()},
+        {h: f.leaps for h, f in found.items() if STICK_SLIP in h},
         {h: f.frequency for h, f in found.items() if f.frequency is not None},
         jumps,
         {h: f.left for h, f in found.items() if f.left is not None},

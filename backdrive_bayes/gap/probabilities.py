@@ -49,19 +49,22 @@ TEMPERATURES = (1.0, np.exp(-1.0), np.exp(-2.0))
 
 def probabilities(
     log_factor: Mapping[tuple[str, ...], float],
+    leaps: Mapping[tuple[str, ...], float],
     left: Mapping[tuple[str, ...], float],
     properties: Mapping[str, float],
     calibration: Calibration = CALIBRATION,
 ) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects, () for none; they sum to one.
 
-    ``log_factor`` are log Bayes factors against none, ``left`` is the variance of the contrasts in noise units that
-    each set without
-    something unlisted leaves, ``properties`` the probabilities of effects inside the class, each taken alone.
+    ``log_factor`` are log Bayes factors against none, of which ``leaps`` is what the samples say of leaps, where they are one of
+    the effects, and the rest what the contrasts say: each has a temperature of its own. ``left`` is the variance of the contrasts
+    in noise units that each set without something unlisted leaves, ``properties`` are the probabilities of effects inside the
+    class, each taken alone.
     """
-    hottest = calibration.cool + calibration.warm * np.sqrt(max(0.0, *log_factor.values()))
-    misfit = _misfits(log_factor, left, calibration)
-    found = [_weights(log_factor, misfit, max(hottest * t, 1.0), calibration) for t in TEMPERATURES]
+    slow = {effects: value - leaps.get(effects, 0.0) for effects, value in log_factor.items()}
+    misfit = _misfits(leaps, left, calibration)
+    hottest = np.array([_hottest(table.values(), calibration) for table in (slow, leaps)])
+    found = [_weights(slow, leaps, misfit, np.maximum(hottest * share, 1.0), calibration) for share in TEMPERATURES]
     joint = {h: float(sum(f[h] for f in found)) / len(found) for h in found[0]}
     for name, p in properties.items():
         joint = _beside(joint, name, p, calibration)
@@ -71,19 +74,24 @@ def probabilities(
     return {h: w / total for h, w in joint.items()}
 
 
-def _weights(log_factor, misfit, temperature, calibration) -> dict[tuple[str, ...], float]:
+def _hottest(log_factors, calibration) -> float:
+    """Highest temperature of what has these log Bayes factors."""
+    return calibration.cool + calibration.warm * np.sqrt(max((0.0, *log_factors)))
+
+
+def _weights(slow, leaps, misfit, temperatures, calibration) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects and of the same with something unlisted beside, without the operator's properties."""
-    weight, least = {}, min(misfit.values())
-    for effects, value in log_factor.items():
+    weight, least, temperature = {}, min(misfit.values()), temperatures[0]
+    for effects, value in slow.items():
         if UNEXPLAINED in effects:
             continue
-        prior = log_prior(effects, calibration)
+        prior = log_prior(effects, calibration) + leaps.get(effects, 0.0) / temperatures[1]
         weight[effects] = value / temperature + prior
         more = tuple(sorted((*effects, UNEXPLAINED)))
         # Something unlisted alone is due where no listed effect explains, not where none does.
         due = misfit[effects] if effects else least
         unlisted_prior = calibration.beside if effects else calibration.unlisted
-        weight[more] = _of_kinds(log_factor.get(more, value), value, temperature) + prior + unlisted_prior + due
+        weight[more] = _of_kinds(slow.get(more, value), value, temperature) + prior + unlisted_prior + due
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
 
@@ -97,10 +105,10 @@ def _of_kinds(log_factor, without, temperature) -> float:
     return without / temperature + one + log(1.0 / KINDS + (1.0 - 1.0 / KINDS) * exp(-one))
 
 
-def _misfits(log_factor, left, calibration) -> dict[tuple[str, ...], float]:
+def _misfits(leaps, left, calibration) -> dict[tuple[str, ...], float]:
     """Log Bayes factor of something unlisted beside each set of listed effects, from what the set leaves."""
     found = {effects: log_misfit(value, calibration.spread) for effects, value in left.items()}
-    if log_factor.get((STICK_SLIP,), 0.0) > 0.0:
+    if leaps.get((STICK_SLIP,), 0.0) > 0.0:
         # Teeth that were found scatter the block means themselves: more than noise is due.
         found |= {effects: min(value, 0.0) for effects, value in found.items() if STICK_SLIP in effects}
     return found

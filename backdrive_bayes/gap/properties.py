@@ -20,7 +20,6 @@ from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
-from backdrive_bayes.gap.probabilities import probabilities
 from backdrive_bayes.mechanics.history import through
 
 DRAWS = 120
@@ -169,7 +168,7 @@ def properties_of(branches: Branches, angle_scale_rad: float, torque_scale_nm: f
 
 def _beside_effects(weighed: Weighed) -> Linear:
     """The linear model solved with the effects that are likeliest, all others at trace level."""
-    joint = probabilities(weighed.log_factor, weighed.left, {})
+    joint = weighed.joint()
     best = max((h for h in joint if h in weighed.log_factor), key=lambda h: joint[h])
     linear = with_columns(weighed, best)
     return replace(linear, solution=learn_scales(linear, levels(linear, best))[2])

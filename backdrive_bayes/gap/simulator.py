@@ -79,7 +79,7 @@ def read_simulator(simulated: Unit, measured: Reduced, seed: int, note: Callable
     unit, added = through_bench(simulated, reduced, measured, rng)
     weighed = weigh(prepare(unit, note=lambda text: note(f"simulator: {text}")))
     properties = {p.name: p.probability for p in find_properties(weighed, rng)}
-    answers = probabilities.labels(probabilities.probabilities(weighed.log_factor, weighed.left, properties))
+    answers = probabilities.labels(weighed.joint(properties))
     note("simulator: sampling")
     posterior = posterior_of(weighed, effects_of(next(iter(answers))), seed, note)
     return Simulator(simulated, reduced, posterior, answers, added)

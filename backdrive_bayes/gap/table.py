@@ -32,10 +32,11 @@ KINDS = len(TOGETHER) + len(ALONE) + 1
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """Log marginal likelihood of a hypothesis about a mode, the variance in noise units that it leaves (none beside something
-    unlisted), and the frequency of its wave, if it has one."""
+    """Log marginal likelihood of a hypothesis about a mode, of which ``leaps`` is what the samples say of teeth, the variance in
+    noise units that it leaves (none beside something unlisted), and the frequency of its wave, if it has one."""
 
     log_marginal: float
+    leaps: float
     left: float | None
     frequency: float | None
 
@@ -81,7 +82,6 @@ class Table:
         self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
         one_way = [n for n, e in effects.items() if isinstance(e, TangentEffect) and e.one_way and n in self.names]
         self.one_way = {n: np.flatnonzero(self.index == self.names.index(n)).tolist() for n in one_way}
-        self.terms |= {STICK_SLIP: _traces(jumps)}
         self.jumps, self.line = jumps, line
         self.trace_wave = wave_trace(linear) / AMPLITUDE
         self.frequency: dict[tuple[str, ...], float] = {}
@@ -113,15 +113,23 @@ class Table:
 
     def weigh(self, hypothesis, lift: float) -> Row:
         """What is to be known of a set of names; ``lift`` makes log marginal likelihoods comparable between modes."""
-        log = self.log_marginal(hypothesis) + lift + (self.jumps.log_factor if STICK_SLIP in hypothesis else 0.0)
-        return Row(log, None if UNEXPLAINED in hypothesis else self.left(hypothesis), self.frequency.get(hypothesis))
+        leaps = self.jumps.log_factor if STICK_SLIP in hypothesis else 0.0
+        log = self.log_marginal(hypothesis) + lift + leaps
+        return Row(log, leaps, None if UNEXPLAINED in hypothesis else self.left(hypothesis), self.frequency.get(hypothesis))
 
     def log_marginal(self, hypothesis) -> float:
-        """Log marginal likelihood of a set of names, averaged over sizes, frequencies and kinds of what is unlisted."""
+        """Log marginal likelihood of the contrasts under a set of names, averaged over sizes, frequencies and kinds of what is
+        unlisted. Teeth that were found leave traces in the block means, or none."""
+        without = self._beside_traces(hypothesis, set())
+        if STICK_SLIP not in hypothesis or self.jumps.log_factor <= 0.0:
+            return without
+        return float(np.logaddexp(without, self._beside_traces(hypothesis, {UNEXPLAINED})) - np.log(2.0))
+
+    def _beside_traces(self, hypothesis, traces: set) -> float:
+        on = self._on(hypothesis) | traces
         if UNEXPLAINED not in hypothesis:
-            return self._of_terms(hypothesis, self._on(hypothesis))
-        listed = tuple(n for n in hypothesis if n != UNEXPLAINED)
-        on = self._on(listed)
+            return self._of_terms(hypothesis, on)
+        on = self._on(n for n in hypothesis if n != UNEXPLAINED) | traces
         kinds = [self._of_terms(hypothesis, on | {k}) for k in TOGETHER]
         if ENCODER not in hypothesis:
             kinds += [self._with_one(name, on) for name in ALONE]
@@ -144,7 +152,7 @@ class Table:
         without, with_trace = self._sized(on, wave.at, wave.columns, (0.0, self.trace_wave) * wave.sizes[:, None])
         found = float(np.logaddexp(without, with_trace + wave.log_prior))
         if len(hypothesis) == 1 and UNEXPLAINED not in hypothesis:
-            self.singles[hypothesis] = found
+            self.singles.setdefault(hypothesis, found)
         return found
 
     def _sized(self, on, at, columns, sizes) -> list[float]:
@@ -216,11 +224,6 @@ class Table:
     def _averaged(self, on, at, columns, sizes) -> float:
         """Log marginal likelihood beside the terms ``on`` averaged over their size and over that of further columns."""
         return averaged(self._sized(on, at, columns, SIZES * sizes[..., None]))
-
-
-def _traces(jumps: Jumps) -> tuple[str, ...]:
-    """Jumps leave traces in the block means that no slow model explains."""
-    return (UNEXPLAINED,) if jumps.log_factor > 0 else ()
 
 
 def _alike(gains, frequencies) -> list[int]:

@@ -30,8 +30,13 @@ def teeth(height, length=20.0, uneven=0.2, seed=1):
     return found
 
 
-def factor(values):
-    return weigh_teeth([Teeth(even_series(values, LEG, 1), 0.002)]).log_factor
+def read(values, step=0.002, trace=0.1):
+    """Values as one record's residuals."""
+    return [Teeth(even_series(values, LEG, 1), step, trace)]
+
+
+def factor(values, **options):
+    return weigh_teeth(read(values, **options)).log_factor
 
 
 @pytest.mark.parametrize("length", [6.0, 20.0, 70.0])
@@ -41,15 +46,26 @@ def test_teeth_ahead_speak(length):
 
 @pytest.mark.parametrize("step", [0.002, 0.002029, 0.002114, 0.0031])
 def test_the_shortest_teeth_are_seen_at_any_step(step):
-    assert weigh_teeth([Teeth(even_series(noise() + teeth(4.0, 4.0), LEG, 1), step)]).log_factor > 20
+    assert factor(noise() + teeth(4.0, 4.0), step=step) > 20
 
 
 def test_noise_alone_speaks_against_them_as_far_as_they_are_seen():
     assert all(np.log(1.0 - SEEN) <= factor(noise(seed)) < -0.3 for seed in range(4))
 
 
+def test_a_trace_of_teeth_is_none():
+    """A planted fault: where no bench is taken to have traces, teeth of that level in four records speak."""
+
+    def of_records(level, trace):
+        height = level * np.sqrt(12.0)
+        values = [noise(k, memory=0.0) + teeth(height, 40.0, seed=k) for k in range(4)]
+        return weigh_teeth([t for v in values for t in read(v, trace=trace)]).log_factor
+
+    assert of_records(0.3, trace=0.3) < 3.0 and of_records(0.3, trace=1e-6) > 8.0 and of_records(1.2, trace=0.3) > 20.0
+
+
 def test_the_leap_is_measured():
-    found = weigh_teeth([Teeth(even_series(0.3 * noise() + teeth(4.0), LEG, 1), 0.002)])
+    found = weigh_teeth(read(0.3 * noise() + teeth(4.0)))
     assert found.size_rad == pytest.approx(4.0, rel=0.4)
 
 
@@ -108,10 +124,12 @@ def test_the_filter_is_the_sum_over_all_runs(memory, height, length):
     assert told != pytest.approx(summed_over_runs(value, fresh, memory, 0.5, height, 1.1 * length), rel=1e-4), "a planted fault"
 
 
-def test_no_teeth_is_the_limit_of_low_teeth():
+@pytest.mark.parametrize("height", [1e-9, 0.0])
+def test_no_teeth_is_the_limit_of_low_teeth(height):
+    """A reading without white noise has traces of no height."""
     series = Series(noise(), np.arange(COUNT) == 0)
     fitted = fit_noise(series)
-    assert tooth_gain(series, fitted, fitted.memory, 1e-9, 20.0) == pytest.approx(0.0, abs=1e-3)
+    assert tooth_gain(series, fitted, fitted.memory, height, 20.0) == pytest.approx(0.0, abs=1e-3)
 
 
 def test_an_encoders_wave_is_taken_off_with_its_harmonics():

@@ -5,7 +5,20 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.planted import LOOPS, MORE, NOISE, PERIOD_RAD, UNITS, UNLISTED, VARIANTS, changed, planted, prepared, smooth_reducer
+from support.planted import (
+    LOOPS,
+    MORE,
+    NOISE,
+    PERIOD_RAD,
+    UNITS,
+    UNLISTED,
+    VARIANTS,
+    changed,
+    planted,
+    prepared,
+    smooth_reducer,
+    teeth,
+)
 
 from backdrive_bayes.engine import periodic, reduced
 from backdrive_bayes.engine.infer import prepare
@@ -24,7 +37,7 @@ def found(name):
     """What was weighed in a unit, the properties of its operator and the joint probabilities."""
     weighed = weigh(prepared(name))
     properties = {p.name: p for p in find_properties(weighed, np.random.default_rng(0))}
-    joint = gap.probabilities(weighed.log_factor, weighed.left, {n: p.probability for n, p in properties.items()})
+    joint = weighed.joint({n: p.probability for n, p in properties.items()})
     return weighed, properties, joint
 
 
@@ -58,7 +71,7 @@ def test_what_breaks_a_symmetry_has_evidence_that_a_clean_unit_has_not(name):
 def test_other_forms_of_an_effect_are_named_with_nothing_beside(name):
     """Teeth of stick-slip; a wave with few periods and strong harmonics; creep under the square of the load."""
     weighed = weigh(prepare(VARIANTS[name]()))
-    answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    answers = gap.labels(weighed.joint())
     assert next(iter(answers)) == name and answers[name] > 0.4
     assert max(weighed.log_factor.values()) < weighed.log_factor[(name,)] + 2
 
@@ -69,7 +82,7 @@ def test_what_is_unlisted_is_unknown_by_a_kind_of_its_own(name, monkeypatch):
     stands for it."""
     unit = UNLISTED[name]()
     weighed = weigh(prepare(unit))
-    answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    answers = gap.labels(weighed.joint())
     assert answers["unknown"] > 0.5
     for kinds in ("TOGETHER", "ALONE"):
         monkeypatch.setattr(table, kinds, tuple(k for k in getattr(table, kinds) if k not in (name, "shape")))
@@ -84,12 +97,25 @@ def test_teeth_that_leap_back_are_no_stick_slip():
     assert weighed.log_factor[("stick_slip",)] < 0
 
 
+@pytest.mark.parametrize("name", ["thermal_drift", "sensor_lag"])
+def test_what_acts_beside_stick_slip_is_named_with_it(name):
+    """A planted fault: leaps that count among the contrasts drown a drift beside them."""
+    weighed = weigh(prepare(changed(UNITS[name](), lambda r, i: teeth(r))))
+    both = f"stick_slip+{name}" if name > "stick_slip" else f"{name}+stick_slip"
+    answers = gap.labels(weighed.joint())
+    assert next(iter(answers)) == both and answers[both] > 0.5
+    wrong = gap.labels(gap.probabilities(weighed.log_factor, {}, weighed.left, {}))
+    assert wrong[both] < answers[both] and (wrong[both] < 0.2 or name != "thermal_drift")
+    # Teeth that leave no trace in the block means cost no more than not to have known that.
+    assert weighed.log_factor[("stick_slip",)] > weighed.leaps[("stick_slip",)] - 0.7
+
+
 @pytest.mark.parametrize(("hertz", "size", "named"), [(50.0, 4e-4, True), (50.0, 2e-5, False)])
 def test_a_hum_in_the_samples_is_something_unlisted(hertz, size, named):
     """The means of blocks do not show it; a line no higher than any bench's resonance is not named."""
     humming = changed(UNITS["none"](), lambda r, i: size * np.sin(2 * np.pi * hertz * r.time_s))
     weighed = weigh(prepare(humming))
-    answers = gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    answers = gap.labels(weighed.joint())
     assert (answers["unknown"] > 0.6) == named and (answers["unknown"] < 0.4) == (not named)
 
 
@@ -112,7 +138,7 @@ def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
     """A planted fault: one phase for both records explains little of it."""
     unit = _waving(6.0, (0.0, 0.24))
     weighed = weigh(prepare(unit))
-    assert next(iter(gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {})))) == "encoder_error"
+    assert next(iter(gap.labels(weighed.joint()))) == "encoder_error"
     monkeypatch.setattr(periodic, "phases", lambda linear: 1)
     monkeypatch.setattr(table, "phases", lambda linear: 1)
     wrong = weigh(prepare(replace(unit, name="again")))
@@ -121,7 +147,7 @@ def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
 
 def test_a_wave_of_one_and_a_half_periods_and_a_soft_flank_are_told_apart_by_their_evidence():
     weighed = weigh(prepare(_waving(1.5)))
-    wave, answers = weighed.log_factor, gap.labels(gap.probabilities(weighed.log_factor, weighed.left, {}))
+    wave, answers = weighed.log_factor, gap.labels(weighed.joint())
     assert max(wave, key=wave.get) == ("encoder_error",) and wave[("encoder_error",)] > wave[("asymmetric_stiffness",)] + 3
     assert "encoder_error" in gap.credible_set(answers)
     soft = found("asymmetric_stiffness")[0].log_factor
@@ -160,7 +186,7 @@ def test_one_rate_says_nothing_of_a_law_of_the_rate():
     """A name that the records cannot tell is as likely as before, not impossible."""
     one = weigh(prepare(planted(known=smooth_reducer(), loops=LOOPS[1:])))
     assert one.log_factor[("rate_dependent_friction",)] == 0.0
-    joint = gap.probabilities(one.log_factor, one.left, {})
+    joint = one.joint()
     assert joint[("rate_dependent_friction",)] == pytest.approx(joint[()] * np.exp(gap.CALIBRATION.single))
 
 

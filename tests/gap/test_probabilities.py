@@ -18,8 +18,8 @@ def given_factors(lag=0.0, drift=0.0, both=0.0, unknown=0.0):
     return log | {("lag", "unknown"): max(lag, unknown), ("drift", "unknown"): max(drift, unknown)}
 
 
-def answer(log, left=None, properties=None):
-    return probabilities(log, {h: 1.0 for h in log if "unknown" not in h} | (left or {}), properties or {})
+def answer(log, left=None, properties=None, leaps=None):
+    return probabilities(log, leaps or {}, {h: 1.0 for h in log if "unknown" not in h} | (left or {}), properties or {})
 
 
 @given(FACTORS, FACTORS, FACTORS, FACTORS, st.floats(0.03, 0.97))
@@ -77,7 +77,7 @@ def test_what_kind_something_unlisted_is_keeps_its_odds_however_hot():
     log = given_factors(lag=listed, unknown=kinds) | {("lag", "unknown"): listed}
     for warm in (0.0, 2.0, 20.0):
         calibration = replace(CALIBRATION, warm=warm, unlisted=0.0, single=0.0)
-        joint = probabilities(log, {h: 1.0 for h in log if "unknown" not in h}, {}, calibration)
+        joint = probabilities(log, {}, {h: 1.0 for h in log if "unknown" not in h}, {}, calibration)
         due = np.exp(log_misfit(1.0, CALIBRATION.spread))
         # The hotter, the more the other kinds count, and no effect at all.
         assert 0.999 * due / KINDS < joint[("unknown",)] / joint[("lag",)] < (due / KINDS) * (1.1 if warm <= 2.0 else 8.0)
@@ -87,10 +87,28 @@ def test_what_teeth_leave_does_not_speak_for_something_unlisted():
     log = given_factors() | {("stick_slip",): 40.0}
     listed = [h for h in log if "unknown" not in h]
     quiet, rough = dict.fromkeys(listed, 1.0), dict.fromkeys(listed, 20.0)
-    assert unlisted(answer(log, rough)) < 0.1
+    assert unlisted(answer(log, rough, leaps={("stick_slip",): 40.0})) < 0.1
     assert unlisted(answer(given_factors(lag=40.0), rough)) > 0.5, "another effect that leaves as much is not all"
     unseen = log | {("stick_slip",): -0.5, ("lag",): 40.0}
-    assert unlisted(answer(unseen, rough)) > 0.5 > unlisted(answer(unseen, quiet)), "teeth that were not found leave nothing"
+    unseen_leaps = {("stick_slip",): -0.5}
+    assert unlisted(answer(unseen, rough, leaps=unseen_leaps)) > 0.5, "teeth that were not found leave nothing"
+    assert unlisted(answer(unseen, quiet, leaps=unseen_leaps)) < 0.5
+
+
+@pytest.mark.parametrize("leaps", [200.0, 2000.0])
+def test_leaps_however_clear_do_not_drown_what_the_contrasts_say(leaps):
+    """A planted fault: leaps that count among the contrasts heat them."""
+    contrasts = {(): 0.0, ("lag",): 14.0, ("stick_slip",): 0.0, ("lag", "stick_slip"): 14.0}
+    teeth = {h: leaps for h in contrasts if "stick_slip" in h}
+    log = {h: value + teeth.get(h, 0.0) for h, value in contrasts.items()}
+
+    def odds(found):
+        return found[("lag", "stick_slip")] / found[("stick_slip",)]
+
+    alone = answer({h: v for h, v in contrasts.items() if h not in teeth})
+    second = np.exp(CALIBRATION.second - CALIBRATION.single)
+    assert odds(answer(log, leaps=teeth)) == pytest.approx(second * alone[("lag",)] / alone[()], rel=0.2)
+    assert odds(answer(log)) < 0.5 * odds(answer(log, leaps=teeth))
 
 
 def test_a_credible_set_holds_the_fewest_answers():

@@ -107,7 +107,7 @@ def _distorted(record, turns):
     return 4e-4 * np.angle((cosine + 1j * sine) * np.exp(-1j * phase)) / 0.3
 
 
-def _teeth(record, height=6e-4, length_nm=4e-3):
+def teeth(record, height=6e-4, length_nm=4e-3):
     """Stick-slip: on every leg the angle hangs back with the torque run since the last leap, and leaps ahead."""
     run = np.cumsum(np.abs(np.diff(record.torque_nm, prepend=record.torque_nm[0])))
     steps = np.random.default_rng(3).uniform(0.8, 1.2, int(run[-1] / length_nm) + 9) * length_nm
@@ -177,8 +177,8 @@ def _jittered(torque, angle, sd, length, rng):
 
 
 VARIANTS = {
-    "stick_slip": lambda: changed(_smooth(), lambda r, i: _teeth(r)),
-    "teeth_back": lambda: changed(_smooth(), lambda r, i: _teeth(r, -6e-4)),
+    "stick_slip": lambda: changed(_smooth(), lambda r, i: teeth(r)),
+    "teeth_back": lambda: changed(_smooth(), lambda r, i: teeth(r, -6e-4)),
     "encoder_error": lambda: changed(_smooth(), lambda r, i: _distorted(r, 3.6)),
     "viscoelastic_creep": lambda: changed(_smooth(loops=MORE), lambda r, i: _delayed_square(r)),
 }
