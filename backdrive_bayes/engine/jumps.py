@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import erf, logsumexp
 
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import HARMONICS
-from backdrive_bayes.engine.sawtooth import Noise, Series, fit_noise, tooth_gain
+from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
 from backdrive_bayes.engine.traces import TRACE
 
 STEEP = 6.0
@@ -25,8 +25,6 @@ RATIO = 1.35
 """Ratio of the lengths that are averaged over, about the spread of a tooth's length, and of the heights."""
 HEIGHTS = 0.5 * RATIO ** np.arange(6)
 """Heights of the teeth in spreads of the residuals that are averaged over; teeth without noise have 2.7."""
-TRACES = np.arange(0.5, 2.5, 0.5)
-"""Sizes of a trace in its standard deviation that are averaged over, normal; larger ones are rare."""
 SHORTEST_RUN = 20
 """Samples between steep places from which teeth can be told from a slow trend, of degree ``TREND``."""
 TREND = 3
@@ -130,22 +128,22 @@ class Teeth:
         """Shortest and longest torque between leaps that can be seen."""
         return SAMPLES * self.step, _longest(self.series) * self.step
 
-    def gain(self, length: float, side: int) -> tuple[float, float]:
-        """Log Bayes factor of teeth of a length in torque over noise, and the leaps' size [rad]."""
+    def gain(self, length: float, side: int) -> tuple[float, float, float]:
+        """Log Bayes factors of teeth of a length in torque and of a trace of them over noise, and the leaps' size [rad]."""
         if not self.lengths[0] <= length <= self.lengths[1]:
-            return 0.0, 0.0
+            return 0.0, 0.0, 0.0
         series, noise, samples = self._level(length)
-        found = _gains(series, noise, side * HEIGHTS, samples)
-        return _averaged(found), float(HEIGHTS[int(np.argmax(np.max(found, axis=0)))] * noise.scale)
+        heights = side * HEIGHTS
+        found = np.array([[tooth_gain(series, noise, m, h, samples) for h in heights] for m in (noise.memory, noise.memory**2)])
+        trace = logsumexp(np.c_[np.zeros(len(found)), found], b=self._trace(noise.scale)) - np.log(len(found))
+        return _averaged(found), float(trace), float(HEIGHTS[int(np.argmax(found.max(axis=0)))] * noise.scale)
 
-    def trace(self, length: float) -> float:
-        """Log Bayes factor of a trace of such teeth over noise."""
-        if not self.lengths[0] <= length <= self.lengths[1]:
-            return 0.0
-        series, noise, samples = self._level(length)
-        found = _gains(series, noise, SAWTOOTH * self.trace_rad / noise.scale * TRACES, samples)
-        weight = np.exp(-0.5 * TRACES**2)
-        return float(logsumexp(found, b=weight / weight.sum() / len(found)))
+    def _trace(self, scale_rad: float) -> np.ndarray:
+        """Probabilities that a trace of teeth is lower than HEIGHTS and that it is about each of them, (1 + heights,): its root
+        mean square is half-normal."""
+        edges = HEIGHTS / np.sqrt(RATIO) * scale_rad / SAWTOOTH
+        below = erf(edges / max(self.trace_rad, np.finfo(float).tiny) / np.sqrt(2.0))
+        return np.diff(np.r_[0.0, below, 1.0])
 
     def _level(self, length: float):
         """The finest means in which a tooth has few samples, their noise, and the samples of a tooth."""
@@ -160,11 +158,6 @@ def _longest(series: Series) -> float:
     return np.diff(np.r_[np.flatnonzero(series.fresh), series.value.size]).max() / SAMPLES
 
 
-def _gains(series: Series, noise: Noise, heights, samples: float) -> list[list[float]]:
-    """Log likelihoods of teeth over noise by the noise's memory and the teeth's height in its spreads."""
-    return [[tooth_gain(series, noise, m, h, samples) for h in heights] for m in (noise.memory, noise.memory**2)]
-
-
 def weigh_teeth(records: list[Teeth]) -> Jumps:
     """Evidence of all records; that of every length is averaged."""
     if not records:
@@ -172,12 +165,10 @@ def weigh_teeth(records: list[Teeth]) -> Jumps:
     shortest, longest = min(t.lengths[0] for t in records), max(t.lengths[1] for t in records)
     lengths = shortest * RATIO ** np.arange(1 + int(np.log(max(longest / shortest, 1.0)) / np.log(RATIO)))
     ahead, back = (np.array([[t.gain(x, side) for t in records] for x in lengths]) for side in (1, -1))
-    total = ahead[:, :, 0].sum(axis=1)
-    best = ahead[int(np.argmax(total))]
-    trace = _averaged([sum(t.trace(x) for t in records) for x in lengths])
-    against = _averaged([0.0, _averaged(back[:, :, 0].sum(axis=1)), trace])
-    seen = _averaged(total) - against
-    return Jumps(float(np.logaddexp(np.log(1.0 - SEEN), np.log(SEEN) + seen)), float(best[int(np.argmax(best[:, 0])), 1]))
+    total, best = ahead.sum(axis=1), ahead[int(np.argmax(ahead[:, :, 0].sum(axis=1)))]
+    against = _averaged([0.0, _averaged(back[:, :, 0].sum(axis=1)), _averaged(total[:, 1])])
+    seen = _averaged(total[:, 0]) - against
+    return Jumps(float(np.logaddexp(np.log(1.0 - SEEN), np.log(SEEN) + seen)), float(best[int(np.argmax(best[:, 0])), 2]))
 
 
 def _averaged(logs) -> float:

@@ -1,9 +1,10 @@
 """From log Bayes factors to probabilities over {none, effects, pairs, unknown}.
 
 Bayesian model comparison is too sure of itself where all models are slightly wrong. Log Bayes factors are divided by a
-temperature that grows with what there is to explain (a coarsened posterior: Miller and Dunson, JASA 114, 2019) and is itself
-known to a factor of some e only, so that probabilities are averaged over it. The numbers of :class:`Calibration` were set on
-labelled units of virtual benches, each scored while left out (studies/diagnosis_calibration.py).
+temperature that grows with what there is to explain (a coarsened posterior: Miller and Dunson, JASA 114, 2019), those of leaps in
+the samples by one of their own. It is itself known to a factor of some e only, so that probabilities are averaged over it. The
+numbers of :class:`Calibration` were set on labelled units of virtual benches, each scored while left out
+(studies/diagnosis_calibration.py).
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from math import exp, log
 import numpy as np
 from scipy.special import gamma, logsumexp
 
-from backdrive_bayes.gap.table import ENCODER, KINDS, STICK_SLIP, UNEXPLAINED
+from backdrive_bayes.gap.table import ENCODER, KINDS, UNEXPLAINED
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Temperature ``cool`` + ``warm`` · √(largest log Bayes factor) at most, and log prior weights relative to none.
+    """Temperature ``cool`` + ``warm`` · √(largest log Bayes factor of its kind) at most, and log prior weights relative to none.
 
     ``single`` is that of one listed effect, ``second`` the further one of a second, ``wave`` the further one of an encoder error
     (any period may come by), ``unlisted`` that of something unlisted, ``beside`` its further one beside a listed effect.
@@ -108,10 +109,8 @@ def _of_kinds(log_factor, without, temperature) -> float:
 def _misfits(leaps, left, calibration) -> dict[tuple[str, ...], float]:
     """Log Bayes factor of something unlisted beside each set of listed effects, from what the set leaves."""
     found = {effects: log_misfit(value, calibration.spread) for effects, value in left.items()}
-    if leaps.get((STICK_SLIP,), 0.0) > 0.0:
-        # Teeth that were found scatter the block means themselves: more than noise is due.
-        found |= {effects: min(value, 0.0) for effects, value in found.items() if STICK_SLIP in effects}
-    return found
+    # Teeth that were found scatter the block means themselves: more than noise is due.
+    return {effects: min(value, 0.0) if leaps.get(effects, 0.0) > 0.0 else value for effects, value in found.items()}
 
 
 def log_misfit(left: float, spread: float) -> float:

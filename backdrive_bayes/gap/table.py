@@ -84,6 +84,7 @@ class Table:
         self.one_way = {n: np.flatnonzero(self.index == self.names.index(n)).tolist() for n in one_way}
         self.jumps, self.line = jumps, line
         self.trace_wave = wave_trace(linear) / AMPLITUDE
+        self.on: dict[tuple[str, ...], set[str]] = {}
         self.frequency: dict[tuple[str, ...], float] = {}
         self.price: dict[tuple[str, ...], float] = {}
         self.singles: dict[tuple[str, ...], float] = {}
@@ -119,17 +120,22 @@ class Table:
 
     def log_marginal(self, hypothesis) -> float:
         """Log marginal likelihood of the contrasts under a set of names, averaged over sizes, frequencies and kinds of what is
-        unlisted. Teeth that were found leave traces in the block means, or none."""
-        without = self._beside_traces(hypothesis, set())
-        if STICK_SLIP not in hypothesis or self.jumps.log_factor <= 0.0:
-            return without
-        return float(np.logaddexp(without, self._beside_traces(hypothesis, {UNEXPLAINED})) - np.log(2.0))
+        unlisted. Teeth that were found scatter the block means as a process on each leg, or no more than a trace of it does."""
+        scattered = (set(), {UNEXPLAINED}) if STICK_SLIP in hypothesis and self.jumps.log_factor > 0.0 else (set(),)
+        listed = self._on(n for n in hypothesis if n != UNEXPLAINED)
+        found = [self._of_kinds(hypothesis, listed | more) for more in scattered]
+        # Beside something unlisted, the first kind is the one whose columns a fit takes.
+        on = listed | scattered[int(np.argmax(found))] | {UNEXPLAINED}.intersection(hypothesis)
+        self.on[hypothesis] = on
+        if ENCODER in hypothesis:
+            wave = self._clearest(on)
+            self.frequency[hypothesis], self.price[hypothesis] = wave.frequency, wave.price
+        return float(logsumexp(found) - np.log(len(found)))
 
-    def _beside_traces(self, hypothesis, traces: set) -> float:
-        on = self._on(hypothesis) | traces
+    def _of_kinds(self, hypothesis, on) -> float:
+        """Log marginal likelihood beside the terms ``on``, averaged over kinds of what is unlisted if that is of the set."""
         if UNEXPLAINED not in hypothesis:
             return self._of_terms(hypothesis, on)
-        on = self._on(n for n in hypothesis if n != UNEXPLAINED) | traces
         kinds = [self._of_terms(hypothesis, on | {k}) for k in TOGETHER]
         if ENCODER not in hypothesis:
             kinds += [self._with_one(name, on) for name in ALONE]
@@ -142,9 +148,6 @@ class Table:
     def _of_terms(self, hypothesis, on) -> float:
         if ENCODER in hypothesis:
             wave = self._clearest(on)
-            # Beside something unlisted, the first kind is the one whose columns a fit takes.
-            self.frequency.setdefault(hypothesis, wave.frequency)
-            self.price.setdefault(hypothesis, wave.price)
             return self._averaged(on, wave.at, wave.columns, wave.sizes) - wave.price
         # Every bench has a trace of a wave, most likely where a wave is clearest beside one effect.
         beside = max((h for h in self.singles if set(h) <= set(hypothesis)), key=self.singles.__getitem__, default=())
@@ -170,7 +173,7 @@ class Table:
 
     def left(self, hypothesis) -> float:
         """Variance of the contrasts in noise units that a hypothesis leaves."""
-        on, at = self._on(hypothesis), None
+        on, at = self.on[hypothesis], None
         if hypothesis in self.frequency:
             at = int(np.argmin(np.abs(self.coarse.members - self.frequency[hypothesis])))
         contrasts = self._about(at, self._unlisted(on, SIZES[-1]))

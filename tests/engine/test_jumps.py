@@ -30,7 +30,7 @@ def teeth(height, length=20.0, uneven=0.2, seed=1):
     return found
 
 
-def read(values, step=0.002, trace=0.1):
+def read(values, step=0.002, trace=0.0):
     """Values as one record's residuals."""
     return [Teeth(even_series(values, LEG, 1), step, trace)]
 
@@ -53,15 +53,20 @@ def test_noise_alone_speaks_against_them_as_far_as_they_are_seen():
     assert all(np.log(1.0 - SEEN) <= factor(noise(seed)) < -0.3 for seed in range(4))
 
 
-def test_a_trace_of_teeth_is_none():
+@pytest.mark.parametrize("size", [0.85, 1.0, 1.7])
+def test_a_trace_of_teeth_is_none(size):
     """A planted fault: where no bench is taken to have traces, teeth of that level in four records speak."""
 
     def of_records(level, trace):
-        height = level * np.sqrt(12.0)
-        values = [noise(k, memory=0.0) + teeth(height, 40.0, seed=k) for k in range(4)]
+        values = [noise(k, memory=0.0) + teeth(level * np.sqrt(12.0), 40.0, seed=k) for k in range(4)]
         return weigh_teeth([t for v in values for t in read(v, trace=trace)]).log_factor
 
-    assert of_records(0.3, trace=0.3) < 3.0 and of_records(0.3, trace=1e-6) > 8.0 and of_records(1.2, trace=0.3) > 20.0
+    assert of_records(0.3, trace=0.3 / size) < 3.0 and of_records(0.3, trace=0.0) > 8.0
+    assert of_records(1.2, trace=0.3 / size) > 5.0
+
+
+def test_without_white_noise_nothing_is_a_trace():
+    assert factor(noise(), trace=0.0) < 0.0 and factor(noise() + teeth(4.0), trace=0.0) > 20
 
 
 def test_the_leap_is_measured():
