@@ -30,7 +30,7 @@ STEPS = {
 }
 """Name of the transcript and the command, in the order of the tutorial."""
 FIGURES = {"loops": "out/low/figures/loop-3.png", "comparison": "out/comparison/figures/comparison-loops.png"}
-PROGRESS = re.compile(r"^\s*\d+ s\s")
+PROGRESS = re.compile(r"(\d+ min )?\d+ s, +\d+%")
 """Lines that tell the time are left out: they differ from run to run."""
 CREDIT = (
     "Credit: measurements by the authors of github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator (`Code/test_data`), "

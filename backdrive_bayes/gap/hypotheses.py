@@ -20,7 +20,8 @@ from backdrive_bayes.mechanics.registry import all_effects
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """Log marginal likelihoods of sets of effects, relative to none, with what they rest on."""
+    """Log marginal likelihoods of sets of effects, relative to none, with what they rest on; ``leaps`` is what the samples' teeth
+    have of those with stick-slip."""
 
     linears: tuple[Linear, ...]
     mode: dict[tuple[str, ...], int]
