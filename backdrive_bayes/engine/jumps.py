@@ -118,7 +118,7 @@ class Teeth:
     def levels(self) -> list:
         """The series, its means of two, four, ... samples, and the noise of each."""
         found, series = [], self.series
-        while _longest(series) >= SAMPLES:
+        while self._longest(series) >= SAMPLES:
             found.append((series, fit_noise(series)))
             series = series.halved()
         return found
@@ -126,15 +126,18 @@ class Teeth:
     @property
     def lengths(self) -> tuple[float, float]:
         """Shortest and longest torque between leaps that can be seen."""
-        return SAMPLES * self.step, _longest(self.series) * self.step
+        return SAMPLES * self.step, self._longest(self.series) * self.step
 
     def gain(self, length: float, side: int) -> tuple[float, float, float]:
         """Log Bayes factors of teeth of a length in torque and of a trace of them over noise, and the leaps' size [rad]."""
         if not self.lengths[0] <= length <= self.lengths[1]:
             return 0.0, 0.0, 0.0
-        series, noise, samples = self._level(length)
-        heights = side * HEIGHTS
-        found = np.array([[tooth_gain(series, noise, m, h, samples) for h in heights] for m in (noise.memory, noise.memory**2)])
+        samples, level = length / self.step, 0
+        while samples >= 4 * SAMPLES and level + 1 < len(self.levels):
+            samples, level = samples / 2, level + 1
+        series, noise = self.levels[level]
+        memories, heights = (noise.memory, noise.memory**2), side * HEIGHTS
+        found = np.array([[tooth_gain(series, noise, m, h, samples) for h in heights] for m in memories])
         trace = logsumexp(np.c_[np.zeros(len(found)), found], b=self._trace(noise.scale)) - np.log(len(found))
         return _averaged(found), float(trace), float(HEIGHTS[int(np.argmax(found.max(axis=0)))] * noise.scale)
 
@@ -145,17 +148,9 @@ class Teeth:
         below = erf(edges / max(self.trace_rad, np.finfo(float).tiny) / np.sqrt(2.0))
         return np.diff(np.r_[0.0, below, 1.0])
 
-    def _level(self, length: float):
-        """The finest means in which a tooth has few samples, their noise, and the samples of a tooth."""
-        samples, level = length / self.step, 0
-        while samples >= 4 * SAMPLES and level + 1 < len(self.levels):
-            samples, level = samples / 2, level + 1
-        return *self.levels[level], samples
-
-
-def _longest(series: Series) -> float:
-    """Samples of the longest teeth."""
-    return np.diff(np.r_[np.flatnonzero(series.fresh), series.value.size]).max() / SAMPLES
+    @staticmethod
+    def _longest(series: Series) -> float:
+        return np.diff(np.r_[np.flatnonzero(series.fresh), series.value.size]).max() / SAMPLES
 
 
 def weigh_teeth(records: list[Teeth]) -> Jumps:

@@ -1,6 +1,7 @@
 """How large an effect may be on this unit where it is a mere trace, and how large it usually is where it acts.
 
-All traces are measured alike: by how far they move the angle, against the noise of a sample. No bench is free of them.
+All traces are measured alike: by how far they move the angle, against the noise of a sample (those of teeth against its white
+part). No bench is free of them.
 """
 
 from __future__ import annotations
