@@ -66,6 +66,7 @@ def weigh_unit(folder: Path, truth: dict) -> dict:
         "severity": truth["size"],
         "log_factor": {"+".join(h): round(v, 2) for h, v in found.weighed.log_factor.items()},
         "leaps": {"+".join(h): round(v, 2) for h, v in found.weighed.leaps.items()},
+        "disturbance": round(found.weighed.disturbance, 2),
         "left": {"+".join(h): round(v, 3) for h, v in found.weighed.left.items()},
         "properties": {p.name: round(p.probability, 4) for p in found.properties},
         "named": "+".join(found.named) or "none",
@@ -111,7 +112,8 @@ def answers(row: dict, calibration: Calibration) -> dict[str, float]:
     if "error" in row:
         return {"none": 0.0, "unknown": 0.0}
 
-    found = labels(probabilities(row["log_factor"], row["leaps"], row["left"], row["properties"], calibration))
+    rests_on = (row[k] for k in ("log_factor", "leaps", "disturbance", "left", "properties"))
+    found = labels(probabilities(*rests_on, calibration))
     likeliest = next(iter(found))
     return moved_to_unknown(found, likeliest) if row.get("unsupported") and row["named"] == likeliest else found
 

@@ -50,19 +50,34 @@ def find_jumps(linear: Linear, wave: float | None = None) -> Jumps:
     return weigh_teeth(residual_series(linear, wave))
 
 
+def residuals(linear: Linear) -> list[np.ndarray]:
+    """What the linear model leaves of every sample's angle [rad], (samples,) by record, less what the torque does beside its own
+    path from block to block."""
+    reduced, slopes = linear.reduced, linear.reduced.slopes(linear.predicted)
+    found = []
+    for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
+        angle = np.interp(record.time_s, blocks.mid_s, linear.predicted[r]) * reduced.angle_scale_rad
+        beside = slopes[r][block_of(record, blocks)] * between_blocks(record, blocks, noise.torque_nm)
+        found.append(record.angle_rad - angle - beside)
+    return found
+
+
+def block_of(record, blocks) -> np.ndarray:
+    """Number of the block of every sample, (samples,)."""
+    return np.clip(np.searchsorted(blocks.begin_s, record.time_s, side="right") - 1, 0, blocks.count.size - 1)
+
+
 def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
     """Residuals of each record that has enough of them."""
-    reduced, found, slopes = linear.reduced, [], linear.reduced.slopes(linear.predicted)
+    reduced, found, left = linear.reduced, [], residuals(linear)
     for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
         slope = np.abs(np.gradient(linear.predicted[r], blocks.mid_s))
         wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
         calm = (wide < STEEP * np.median(slope)) & reduced.settled[r]
-        block = np.clip(np.searchsorted(blocks.begin_s, record.time_s, side="right") - 1, 0, blocks.count.size - 1)
-        leg, angle = np.where(calm, blocks.leg, -1)[block], np.interp(record.time_s, blocks.mid_s, linear.predicted[r])
-        rest = record.angle_rad - angle * reduced.angle_scale_rad
-        rest -= slopes[r][block] * between_blocks(record, blocks, noise.torque_nm)
+        block, rest = block_of(record, blocks), left[r]
+        leg = np.where(calm, blocks.leg, -1)[block]
         if wave is not None:
-            rest = without_wave(rest, angle, leg, wave)
+            rest = without_wave(rest, np.interp(record.time_s, blocks.mid_s, linear.predicted[r]), leg, wave)
         step = float(np.median(np.diff(record.time_s)))
         width = max(1, round(noise.correlation_time_s / SAMPLES / step))
         series = even_series(rest * blocks.direction[blocks.leg[block]], leg, width)

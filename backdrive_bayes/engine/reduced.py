@@ -10,7 +10,6 @@ import numpy as np
 from backdrive_bayes.engine.covariance import channel_covariance, local_slope, path_covariance
 from backdrive_bayes.mechanics.effect import Context
 from backdrive_bayes.records.branches import find_segments
-from backdrive_bayes.records.lines import clearest_line
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
 from backdrive_bayes.records.reduction import Blocks, full_legs, reduce_record
@@ -143,16 +142,6 @@ class Reduced(BlockMeans):
         return replace(
             self, blocks=self.blocks[:record] + self.blocks[record + 1 :], noise=self.noise[:record] + self.noise[record + 1 :]
         )
-
-
-def disturbance(reduced: Reduced) -> float:
-    """Log Bayes factor of a periodic disturbance in the record where it is clearest; minus infinity without a spectrum."""
-    found = []
-    for record, noise in zip(reduced.unit.records, reduced.noise, strict=True):
-        segments = find_segments(record.time_s, record.torque_nm)
-        line = clearest_line(ChannelRecord(record.time_s, record.torque_nm, record.angle_rad, segments), noise)
-        found.append(-np.inf if line is None else line.log_factor)
-    return max(found)
 
 
 def reduce_unit(unit: Unit, blocks_per_leg: int | None = None) -> Reduced:

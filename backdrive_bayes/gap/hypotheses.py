@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from backdrive_bayes.engine.disturbance import disturbance
 from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import with_wave
-from backdrive_bayes.engine.reduced import disturbance
 from backdrive_bayes.gap.probabilities import probabilities
 from backdrive_bayes.gap.table import ENCODER, STICK_SLIP, UNEXPLAINED, Table
 from backdrive_bayes.mechanics.registry import all_effects
@@ -21,12 +21,13 @@ from backdrive_bayes.mechanics.registry import all_effects
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """Log marginal likelihoods of sets of effects, relative to none, with what they rest on; ``leaps`` is what the samples' teeth
-    have of those with stick-slip."""
+    have of those with stick-slip, ``disturbance`` the log Bayes factor of a periodic disturbance in the samples."""
 
     linears: tuple[Linear, ...]
     mode: dict[tuple[str, ...], int]
     log_factor: dict[tuple[str, ...], float]
     leaps: dict[tuple[str, ...], float]
+    disturbance: float
     frequency: dict[tuple[str, ...], float]
     jumps: Jumps
     left: dict[tuple[str, ...], float]
@@ -40,7 +41,7 @@ class Weighed:
 
     def joint(self, properties: Mapping[str, float] | None = None) -> dict[tuple[str, ...], float]:
         """Probability of every set of effects; ``properties`` are those of effects inside the class, each taken alone."""
-        return probabilities(self.log_factor, self.leaps, self.left, properties or {})
+        return probabilities(self.log_factor, self.leaps, self.disturbance, self.left, properties or {})
 
     def of(self, effects: tuple[str, ...]) -> Linear:
         """The linear model about the mode where a hypothesis is most likely."""
@@ -53,13 +54,13 @@ class Weighed:
 
 def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
     """Weigh none, every effect and every pair about every mode; ``allowed`` restricts the names."""
-    jumps, line = find_jumps(linears[0]), disturbance(linears[0].reduced)
+    jumps = find_jumps(linears[0])
     names = [n for n in (*all_effects(), UNEXPLAINED, ENCODER, STICK_SLIP) if n == UNEXPLAINED or allowed is None or n in allowed]
     hypotheses = [(), *((n,) for n in names), *itertools.combinations(sorted(names), 2)]
     rows, lifts, samples = [], [], []
     # One table at a time: each is large.
     for linear in linears:
-        table = Table(linear, jumps, line)
+        table = Table(linear, jumps)
         lifts.append(_level(table, names) if len(linears) > 1 else 0.0)
         rows.append({h: table.weigh(h, lifts[-1]) for h in hypotheses})
         samples.append(table.contrasts.samples)
@@ -74,7 +75,7 @@ def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
         if max(waved, jumps.log_factor) > 0:
             beside = find_jumps(linears[0], rows[0][(ENCODER,)].frequency)
             for linear, row, lift in zip(linears, rows, lifts, strict=True):
-                row[both] = Table(linear, beside, line).weigh(both, lift)
+                row[both] = Table(linear, beside).weigh(both, lift)
     mode = {h: best_mode(h) for h in hypotheses}
     found = {h: rows[m][h] for h, m in mode.items()}
     return Weighed(
@@ -82,6 +83,7 @@ def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
         mode,
         {h: f.log_marginal - none for h, f in found.items()},
         {h: f.leaps for h, f in found.items() if STICK_SLIP in h},
+        disturbance(linears[0]),
         {h: f.frequency for h, f in found.items() if f.frequency is not None},
         jumps,
         {h: f.left for h, f in found.items() if f.left is not None},

@@ -51,6 +51,7 @@ TEMPERATURES = (1.0, np.exp(-1.0), np.exp(-2.0))
 def probabilities(
     log_factor: Mapping[tuple[str, ...], float],
     leaps: Mapping[tuple[str, ...], float],
+    disturbance: float,
     left: Mapping[tuple[str, ...], float],
     properties: Mapping[str, float],
     calibration: Calibration = CALIBRATION,
@@ -58,14 +59,17 @@ def probabilities(
     """Probability of every set of effects, () for none; they sum to one.
 
     ``log_factor`` are log Bayes factors against none, of which ``leaps`` is what the samples say of leaps, where they are one of
-    the effects, and the rest what the contrasts say: each has a temperature of its own. ``left`` is the variance of the contrasts
+    the effects, and the rest what the contrasts say: each has a temperature of its own. ``disturbance`` is that of a periodic
+    disturbance in the samples, a kind of what is unlisted; one frequency in several records is no matter of any model, and is not
+    coarsened. ``left`` is the variance of the contrasts
     in noise units that each set without something unlisted leaves, ``properties`` are the probabilities of effects inside the
     class, each taken alone.
     """
     slow = {effects: value - leaps.get(effects, 0.0) for effects, value in log_factor.items()}
     misfit = _misfits(leaps, left, calibration)
     hottest = np.array([_hottest(table.values(), calibration) for table in (slow, leaps)])
-    found = [_weights(slow, leaps, misfit, np.maximum(hottest * share, 1.0), calibration) for share in TEMPERATURES]
+    heated = [np.maximum(hottest * share, 1.0) for share in TEMPERATURES]
+    found = [_weights(slow, leaps, disturbance, misfit, temperatures, calibration) for temperatures in heated]
     joint = {h: float(sum(f[h] for f in found)) / len(found) for h in found[0]}
     for name, p in properties.items():
         joint = _beside(joint, name, p, calibration)
@@ -80,7 +84,7 @@ def _hottest(log_factors, calibration) -> float:
     return calibration.cool + calibration.warm * np.sqrt(max((0.0, *log_factors)))
 
 
-def _weights(slow, leaps, misfit, temperatures, calibration) -> dict[tuple[str, ...], float]:
+def _weights(slow, leaps, disturbance, misfit, temperatures, calibration) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects and of the same with something unlisted beside, without the operator's properties."""
     weight, least, temperature = {}, min(misfit.values()), temperatures[0]
     for effects, value in slow.items():
@@ -92,7 +96,8 @@ def _weights(slow, leaps, misfit, temperatures, calibration) -> dict[tuple[str, 
         # Something unlisted alone is due where no listed effect explains, not where none does.
         due = misfit[effects] if effects else least
         unlisted_prior = calibration.beside if effects else calibration.unlisted
-        weight[more] = _of_kinds(slow.get(more, value), value, temperature) + prior + unlisted_prior + due
+        kinds = log(KINDS) + _of_kinds(slow.get(more, value), value, temperature), disturbance + value / temperature
+        weight[more] = logsumexp(kinds) - log(KINDS + 1) + prior + unlisted_prior + due
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
 

@@ -3,10 +3,10 @@
 Evidence against the class cannot find what the class holds. What tells a property are the two branches of the settled loop
 beside each other. A clearance with drag is crossed while loading and not while unloading, so a second one is a step of the
 difference of the branches, in which elasticity cancels and to which friction adds no step. It needs a first one, crossed at less
-torque: a reducer may cross its only clearance against much drag. A clamp that slips yields more the
-nearer the loading branch comes to the tip, while contacts only harden. The probability of each is that of its size among those
-that are there, not among those that reducers have without it; steps of the unloading branch, where nothing is crossed, tell how
-uneven the reading is.
+torque: a reducer may cross its only clearance against much drag. A clamp that slips yields more the nearer the loading branch
+comes to the tip, while contacts only harden, and a body that softens does so on both branches. The probability of each is that
+of its size among those that are there, not among those that reducers have without it; steps of the unloading branch, where
+nothing is crossed, tell how uneven the reading is.
 """
 
 from __future__ import annotations
@@ -122,6 +122,18 @@ def slips(branches: Branches) -> np.ndarray:
     return branches.loading[:, -1:] - there - compliance * left - 0.5 * growth * left * (left + BEFORE)
 
 
+def softens(branches: Branches) -> np.ndarray:
+    """Most angle that the unloading branch crosses over a range as long as that from an onset to full load beyond what it crosses
+    over as long a range below, (draws, onsets)."""
+    found = []
+    for length in 1.0 - np.array(ONSETS):
+        middle = np.linspace(TORQUES[0] + length, 1.0 - length, TORQUES.size)
+        below, there, above = (_at(branches.z, branches.unloading, middle + k * length) for k in (-1, 0, 1))
+        more = above - 2.0 * there + below
+        found.append(np.maximum(more[:, np.argmax(more.mean(axis=0))], 0.0))
+    return np.stack(found, axis=1)
+
+
 def unevenness(branches: Branches) -> np.ndarray:
     """Variance of what the unloading branch shows as steps beyond its own uncertainty, (widths,)."""
     apparent = steps(branches.z, branches.unloading, steeper=False)
@@ -157,7 +169,7 @@ def properties_of(branches: Branches, angle_scale_rad: float, torque_scale_nm: f
     # The difference of two branches is as uneven as both.
     twice = np.repeat(2.0 * uneven, TORQUES.size)
     second = crossed.reshape(crossed.shape[0], -1), np.tile(TORQUES, len(WIDTHS)), twice, OWN
-    slip = slips(branches), np.array(ONSETS), uneven[1], SOFTENING
+    slip = slips(branches) - softens(branches), np.array(ONSETS), uneven[1], SOFTENING
     found = []
     for name, (sizes, torques, variance, own) in (("second_backlash", second), ("interface_slip", slip)):
         log_factor, best = present(sizes, variance, own)

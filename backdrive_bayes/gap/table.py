@@ -26,8 +26,8 @@ TOGETHER = (UNEXPLAINED, "module_change", "uneven", "ratchet", "shape")
 directions that part, a set that grows with the way, a shape in the angle."""
 ALONE = ("step", "bump")
 """The same of one weight among many: a step in time, a bump in the angle."""
-KINDS = len(TOGETHER) + len(ALONE) + 1
-"""Number of kinds of what is unlisted, a line in the spectrum of the noise the last; each is as likely."""
+KINDS = len(TOGETHER) + len(ALONE)
+"""Number of kinds of what is unlisted in the contrasts; a disturbance in the samples is one more, and each is as likely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Table:
     The many weights of a process on each leg are integrated once for each of its levels, as those of the class are.
     """
 
-    def __init__(self, linear: Linear, jumps: Jumps, line: float):
+    def __init__(self, linear: Linear, jumps: Jumps):
         self.phases = phases(linear)
         self.coarse = coarse_bank(self.phases)
         self.linear = linear
@@ -82,7 +82,7 @@ class Table:
         self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
         one_way = [n for n, e in effects.items() if isinstance(e, TangentEffect) and e.one_way and n in self.names]
         self.one_way = {n: np.flatnonzero(self.index == self.names.index(n)).tolist() for n in one_way}
-        self.jumps, self.line = jumps, line
+        self.jumps = jumps
         self.trace_wave = wave_trace(linear) / AMPLITUDE
         self.on: dict[tuple[str, ...], set[str]] = {}
         self.frequency: dict[tuple[str, ...], float] = {}
@@ -139,7 +139,6 @@ class Table:
         kinds = [self._of_terms(hypothesis, on | {k}) for k in TOGETHER]
         if ENCODER not in hypothesis:
             kinds += [self._with_one(name, on) for name in ALONE]
-        kinds.append(self._of_terms(hypothesis, on) + self.line)
         return float(logsumexp(kinds) - np.log(len(kinds)))
 
     def _on(self, hypothesis) -> set:

@@ -104,7 +104,8 @@ def test_what_acts_beside_stick_slip_is_named_with_it(name):
     both = "+".join(sorted(("stick_slip", name)))
     answers = gap.labels(weighed.joint())
     assert next(iter(answers)) == both and answers[both] > 0.5
-    wrong = gap.labels(gap.probabilities(weighed.log_factor, dict.fromkeys(weighed.leaps, 1e-9), weighed.left, {}))
+    seen = dict.fromkeys(weighed.leaps, 1e-9)
+    wrong = gap.labels(gap.probabilities(weighed.log_factor, seen, weighed.disturbance, weighed.left, {}))
     assert wrong[both] < answers[both] - (0.3 if name == "thermal_drift" else 0.01)
     # Teeth that do not scatter the block means cost no more than not to have known that.
     assert weighed.log_factor[("stick_slip",)] > weighed.leaps[("stick_slip",)] - 0.7
@@ -113,7 +114,7 @@ def test_what_acts_beside_stick_slip_is_named_with_it(name):
 @pytest.mark.parametrize(("teeth_factor", "with_process", "expected"), [(5.0, 3.0, 2.43), (5.0, -3.0, 0.33), (-0.5, 3.0, 1.0)])
 def test_teeth_that_were_found_scatter_the_block_means_or_not(teeth_factor, with_process, expected, monkeypatch):
     """Both are as likely before; what is left is judged beside the likelier one."""
-    weighed = table.Table(prepared("none")[0], jumps.Jumps(teeth_factor, 1e-4), 0.0)
+    weighed = table.Table(prepared("none")[0], jumps.Jumps(teeth_factor, 1e-4))
     monkeypatch.setattr(weighed, "_of_kinds", lambda hypothesis, on: with_process if "unknown" in on else 1.0)
     assert weighed.log_marginal(("stick_slip",)) == pytest.approx(expected, abs=0.01)
     assert ("unknown" in weighed.on[("stick_slip",)]) == (expected > 2.0)

@@ -18,8 +18,9 @@ def given_factors(lag=0.0, drift=0.0, both=0.0, unknown=0.0):
     return log | {("lag", "unknown"): max(lag, unknown), ("drift", "unknown"): max(drift, unknown)}
 
 
-def answer(log, left=None, properties=None, leaps=None):
-    return probabilities(log, leaps or {}, {h: 1.0 for h in log if "unknown" not in h} | (left or {}), properties or {})
+def answer(log, left=None, properties=None, leaps=None, disturbance=-np.inf, calibration=CALIBRATION):
+    left = {h: 1.0 for h in log if "unknown" not in h} | (left or {})
+    return probabilities(log, leaps or {}, disturbance, left, properties or {}, calibration)
 
 
 @given(FACTORS, FACTORS, FACTORS, FACTORS, st.floats(0.03, 0.97))
@@ -77,10 +78,28 @@ def test_what_kind_something_unlisted_is_keeps_its_odds_however_hot():
     log = given_factors(lag=listed, unknown=kinds) | {("lag", "unknown"): listed}
     for warm in (0.0, 2.0, 20.0):
         calibration = replace(CALIBRATION, warm=warm, unlisted=0.0, single=0.0)
-        joint = probabilities(log, {}, {h: 1.0 for h in log if "unknown" not in h}, {}, calibration)
+        joint = answer(log, calibration=calibration)
         due = np.exp(log_misfit(1.0, CALIBRATION.spread))
+        one = due / (KINDS + 1)
         # The hotter, the more the other kinds count, and no effect at all.
-        assert 0.999 * due / KINDS < joint[("unknown",)] / joint[("lag",)] < (due / KINDS) * (1.1 if warm <= 2.0 else 8.0)
+        assert 0.999 * one < joint[("unknown",)] / joint[("lag",)] < one * (1.1 if warm <= 2.0 else 8.0)
+
+
+@pytest.mark.parametrize("lag", [0.0, 2000.0])
+def test_a_disturbance_speaks_for_something_unlisted_however_hot_the_contrasts(lag):
+    """A planted fault: one that counts among the contrasts is coarsened with them."""
+    log = given_factors(lag=lag)
+    assert unlisted(answer(log, disturbance=20.0)) > 0.99 > 0.5 > unlisted(answer(log, disturbance=0.0))
+    among = log | {h: v + 20.0 for h, v in log.items() if "unknown" in h}
+    assert unlisted(answer(among)) < 0.95
+
+
+def test_a_disturbance_is_one_kind_among_many():
+    """Its odds to a kind in the contrasts that explains as much are even."""
+    log = given_factors(unknown=400.0 - np.log(KINDS))
+    cold = replace(CALIBRATION, cool=1.0, warm=0.0)
+    one, both = (answer(log, disturbance=d, calibration=cold) for d in (-np.inf, 400.0))
+    assert both[("unknown",)] / both[()] == pytest.approx(2.0 * one[("unknown",)] / one[()], rel=1e-3)
 
 
 def test_what_teeth_leave_does_not_speak_for_something_unlisted():
