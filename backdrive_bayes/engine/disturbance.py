@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.special import erf, logsumexp
+from scipy.special import logsumexp
 
 from backdrive_bayes.engine.jumps import residuals
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.traces import TRACE
+from backdrive_bayes.engine.log_mean import log_mean
+from backdrive_bayes.engine.traces import TRACE, trace_probabilities
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.lines import clearest_line
 from backdrive_bayes.records.noise import ChannelRecord
@@ -33,6 +34,8 @@ HANN = 1.5
 """Noise bandwidth of a Hann taper, in ordinates."""
 NYQUIST = 0.9
 """Share of half the sampling rate up to which an uneven clock leaves a line where it is."""
+GAPS = 2
+"""Times as many instants as samples from which on a record has more gaps than samples: it tells no frequency."""
 MOST = 300_000
 """Frequencies that are tried, the lowest; each is as likely."""
 
@@ -66,7 +69,7 @@ def disturbance(linear: Linear) -> float:
         segments = find_segments(record.time_s, record.torque_nm)
         line = clearest_line(ChannelRecord(record.time_s, record.torque_nm, record.angle_rad, segments), noise)
         found.append(-np.inf if line is None else line.log_factor)
-    return float(np.logaddexp(max(found), common_line(linear)) - np.log(2.0))
+    return float(log_mean([max(found), common_line(linear)]))
 
 
 def common_line(linear: Linear) -> float:
@@ -74,19 +77,22 @@ def common_line(linear: Linear) -> float:
     distance in torque."""
     reduced, left = linear.reduced, residuals(linear)
     spread = float(np.median([1.4826 * np.median(np.abs(rest)) for rest in left]))
-    each = zip(reduced.unit.records, reduced.blocks, left, strict=True)
-    spectra = [_spectrum(record.time_s, rest, spread, blocks) for record, blocks, rest in each]
+    legs = [(blocks.end_s[-1] - blocks.begin_s[0]) / blocks.direction.size for blocks in reduced.blocks]
+    each = zip(reduced.unit.records, left, legs, strict=True)
+    spectra = [spectrum(record.time_s, rest, spread, leg_s) for record, rest, leg_s in each]
     rate = np.asarray(reduced.context.rate) / np.max(reduced.context.rate)
     in_time, in_torque = (_shared(spectra, spread * SIZES, scale) for scale in (np.ones(rate.size), rate))
-    trace = TRACE * float(np.median([noise.white_rad for noise in reduced.noise]))
-    none = np.logaddexp(logsumexp(np.r_[0.0, in_time], b=_trace(spread * SIZES, trace)), _averaged(in_torque)) - np.log(2.0)
-    return float(_averaged(in_time) - none)
+    level = TRACE * float(np.median([noise.white_rad for noise in reduced.noise]))
+    trace = logsumexp(np.r_[0.0, in_time], b=trace_probabilities(spread * SIZES, RATIO, level))
+    return float(log_mean(in_time) - log_mean([trace, log_mean(in_torque)]))
 
 
-def _spectrum(time_s, rest, spread: float, blocks) -> Spectrum:
-    """The spectrum of a record at even times."""
+def spectrum(time_s, rest, spread: float, leg_s: float) -> Spectrum:
+    """The spectrum of a record's residuals ``rest`` (samples,) at even times, cut off beyond FAR times the ``spread``; ``leg_s``
+    is the usual duration of a leg."""
     step = float(np.median(np.diff(time_s)))
-    even = np.interp(np.arange(int((time_s[-1] - time_s[0]) / step) + 1) * step + time_s[0], time_s, rest)
+    count = int((time_s[-1] - time_s[0]) / step) + 1
+    even = np.interp(np.arange(min(count, GAPS * time_s.size)) * step + time_s[0], time_s, rest)
     even = np.clip(even, -FAR * spread, FAR * spread)
     taper = np.hanning(even.size + 2)[1:-1]
     power = np.abs(np.fft.rfft(taper * (even - even.mean()), PERIODS * even.size)) ** 2 / np.sum(taper**2)
@@ -94,8 +100,8 @@ def _spectrum(time_s, rest, spread: float, blocks) -> Spectrum:
     noise = median_filter(power[::PERIODS], 2 * NEAR + 1, mode="nearest") / np.log(2.0)
     noise = np.interp(np.arange(power.size), np.arange(0, power.size, PERIODS), noise)
     noise = np.maximum(noise, np.finfo(float).tiny)
-    leg = (blocks.end_s[-1] - blocks.begin_s[0]) / blocks.direction.size
-    return Spectrum(power / noise, noise, even.size, 1.0 / (PERIODS * even.size * step), (PERIODS / leg, NYQUIST * 0.5 / step))
+    within = (PERIODS / leg_s, NYQUIST * 0.5 / step if count == even.size else 0.0)
+    return Spectrum(power / noise, noise, even.size, 1.0 / (PERIODS * even.size * step), within)
 
 
 def _shared(spectra: list[Spectrum], sizes_rad, scale) -> np.ndarray:
@@ -108,17 +114,8 @@ def _shared(spectra: list[Spectrum], sizes_rad, scale) -> np.ndarray:
     for spectrum, k in zip(spectra, scale, strict=True):
         found, told = spectrum.gains(k * frequencies, sizes_rad)
         if told.any():
-            own = np.logaddexp(0.0, _averaged(found[:, told])) - np.log(2.0)
+            own = log_mean([0.0, log_mean(found[:, told])])
             total[:, told] += np.logaddexp(0.0, found[:, told] - own) - np.log(2.0)
             seen |= told
-    return logsumexp(total[:, seen], axis=1) - np.log(seen.sum()) if seen.any() else np.zeros(len(sizes_rad))
+    return log_mean(total[:, seen], axis=1) if seen.any() else np.zeros(len(sizes_rad))
 
-
-def _trace(sizes_rad, trace_rad: float) -> np.ndarray:
-    """Probabilities that a trace of a line is below all sizes and that it is about each of them, (1 + sizes,): half-normal."""
-    below = erf(sizes_rad / np.sqrt(RATIO) / max(trace_rad, np.finfo(float).tiny) / np.sqrt(2.0))
-    return np.diff(np.r_[0.0, below, 1.0])
-
-
-def _averaged(logs) -> float:
-    return float(logsumexp(logs) - np.log(np.size(logs)))

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import erf, logsumexp
+from scipy.special import logsumexp
 
 from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.log_mean import log_mean
 from backdrive_bayes.engine.periodic import HARMONICS
 from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
-from backdrive_bayes.engine.traces import TRACE
+from backdrive_bayes.engine.traces import TRACE, trace_probabilities
 
 STEEP = 6.0
 """Slopes beyond so many times the median are clearances being crossed: nothing is looked for there."""
@@ -153,15 +154,9 @@ class Teeth:
         series, noise = self.levels[level]
         memories, heights = (noise.memory, noise.memory**2), side * HEIGHTS
         found = np.array([[tooth_gain(series, noise, m, h, samples) for h in heights] for m in memories])
-        trace = logsumexp(np.c_[np.zeros(len(found)), found], b=self._trace(noise.scale)) - np.log(len(found))
-        return _averaged(found), float(trace), float(HEIGHTS[int(np.argmax(found.max(axis=0)))] * noise.scale)
-
-    def _trace(self, scale_rad: float) -> np.ndarray:
-        """Probabilities that a trace of teeth is lower than HEIGHTS and that it is about each of them, (1 + heights,): its root
-        mean square is half-normal."""
-        edges = HEIGHTS / np.sqrt(RATIO) * scale_rad / SAWTOOTH
-        below = erf(edges / max(self.trace_rad, np.finfo(float).tiny) / np.sqrt(2.0))
-        return np.diff(np.r_[0.0, below, 1.0])
+        sizes = trace_probabilities(HEIGHTS * noise.scale / SAWTOOTH, RATIO, self.trace_rad)
+        trace = log_mean([logsumexp(np.r_[0.0, row], b=sizes) for row in found])
+        return float(log_mean(found)), float(trace), float(HEIGHTS[int(np.argmax(found.max(axis=0)))] * noise.scale)
 
     @staticmethod
     def _longest(series: Series) -> float:
@@ -176,10 +171,6 @@ def weigh_teeth(records: list[Teeth]) -> Jumps:
     lengths = shortest * RATIO ** np.arange(1 + int(np.log(max(longest / shortest, 1.0)) / np.log(RATIO)))
     ahead, back = (np.array([[t.gain(x, side) for t in records] for x in lengths]) for side in (1, -1))
     total, best = ahead.sum(axis=1), ahead[int(np.argmax(ahead[:, :, 0].sum(axis=1)))]
-    against = _averaged([0.0, _averaged(back[:, :, 0].sum(axis=1)), _averaged(total[:, 1])])
-    seen = _averaged(total[:, 0]) - against
+    against = log_mean([0.0, log_mean(back[:, :, 0].sum(axis=1)), log_mean(total[:, 1])])
+    seen = log_mean(total[:, 0]) - against
     return Jumps(float(np.logaddexp(np.log(1.0 - SEEN), np.log(SEEN) + seen)), float(best[int(np.argmax(best[:, 0])), 2]))
-
-
-def _averaged(logs) -> float:
-    return float(logsumexp(logs) - np.log(np.size(logs)))

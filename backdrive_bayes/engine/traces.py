@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.special import erf
 
 from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.linear import Linear
@@ -37,6 +38,13 @@ def trace_levels(reduced: Reduced, design: Design, effects: Iterable[Effect]) ->
             count += int(settled.sum())
         found[effect.name] = present if effect is BENCH_HYSTERESIS else TRACE / max(np.sqrt(square / count), TRACE / present)
     return found
+
+
+def trace_probabilities(sizes, ratio: float, level: float) -> np.ndarray:
+    """Probabilities that a trace in the samples, of a root mean square that is half-normal with ``level``, is below all ``sizes``
+    (n,), which are ``ratio`` apart, and that it is about each of them, (1 + n,)."""
+    below = erf(sizes / np.sqrt(ratio) / max(level, np.finfo(float).tiny) / np.sqrt(2.0))
+    return np.diff(np.r_[0.0, below, 1.0])
 
 
 def wave_trace(linear: Linear) -> float:

@@ -18,6 +18,7 @@ from scipy.special import expit, log_ndtr, logsumexp
 
 from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.log_mean import log_mean
 from backdrive_bayes.gap.averaged import with_columns
 from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.mechanics.history import through
@@ -150,8 +151,8 @@ def present(sizes, uneven, own: tuple[float, float]) -> tuple[float, int]:
     """
     mean, variance = sizes.mean(axis=0), sizes.var(axis=0) + USUAL**2 + uneven
     there, other = (_gain(mean, variance, sd) for sd in (LARGE, own[1]))
-    without = logsumexp([0.0, logsumexp(other) - np.log(other.size)], b=[1.0 - own[0], own[0]])
-    return float(logsumexp(there) - np.log(there.size) - without), int(np.argmax(there))
+    without = logsumexp([0.0, log_mean(other)], b=[1.0 - own[0], own[0]])
+    return float(log_mean(there) - without), int(np.argmax(there))
 
 
 def find_properties(weighed: Weighed, rng) -> tuple[Property, ...]:

@@ -11,6 +11,7 @@ from backdrive_bayes.engine.contrasts import SIZES, Contrasts, averaged, effect_
 from backdrive_bayes.engine.design import Group, path_group
 from backdrive_bayes.engine.jumps import Jumps
 from backdrive_bayes.engine.linear import Linear
+from backdrive_bayes.engine.log_mean import log_mean
 from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group
 from backdrive_bayes.engine.traces import trace_levels, usual_level, wave_trace
 from backdrive_bayes.engine.unlisted import bump_groups, module_group, ratchet_group, step_group, uneven_group
@@ -130,7 +131,7 @@ class Table:
         if ENCODER in hypothesis:
             wave = self._clearest(on)
             self.frequency[hypothesis], self.price[hypothesis] = wave.frequency, wave.price
-        return float(logsumexp(found) - np.log(len(found)))
+        return float(log_mean(found))
 
     def _of_kinds(self, hypothesis, on) -> float:
         """Log marginal likelihood beside the terms ``on``, averaged over kinds of what is unlisted if that is of the set."""
@@ -139,7 +140,7 @@ class Table:
         kinds = [self._of_terms(hypothesis, on | {k}) for k in TOGETHER]
         if ENCODER not in hypothesis:
             kinds += [self._with_one(name, on) for name in ALONE]
-        return float(logsumexp(kinds) - np.log(len(kinds)))
+        return float(log_mean(kinds))
 
     def _on(self, hypothesis) -> set:
         return set().union(*(self.terms.get(n, ()) for n in hypothesis))
@@ -200,7 +201,7 @@ class Table:
         columns = np.flatnonzero(self.index == self.names.index(name))[:, None]
         gains = contrasts.gains(self.scale(on), columns, np.full(columns.shape, AMPLITUDE))
         at = int(np.argmax(gains))
-        price = gains[at] - (logsumexp(gains) - np.log(gains.size))
+        price = gains[at] - log_mean(gains)
         return self._averaged(on, None, columns[at], np.full(1, AMPLITUDE)) - price
 
     def _clearest(self, on) -> _Wave:
@@ -214,7 +215,7 @@ class Table:
             near, bank = self._about(at, level), fine_bank(self.coarse.members[at], self.phases)
             columns = self.index.size + bank.columns
             closely = near.gains(scale, columns, bank.sizes)
-            gains[at], fine[at] = logsumexp(closely) - np.log(closely.size), (bank, columns, closely)
+            gains[at], fine[at] = log_mean(closely), (bank, columns, closely)
         at = max(fine, key=lambda at: gains[at] + weight[at])
         bank, columns, closely = fine[at]
         member = int(np.argmax(closely))

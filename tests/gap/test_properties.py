@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from backdrive_bayes.gap.properties import Branches, properties_of, steps, unevenness
+from backdrive_bayes.gap.properties import Branches, properties_of, unevenness
 
 Z = np.linspace(0.0, 1.0, 1001)
 NOISE = 1e-3
