@@ -61,9 +61,8 @@ def probabilities(
     ``log_factor`` are log Bayes factors against none, of which ``leaps`` is what the samples say of leaps, where they are one of
     the effects, and the rest what the contrasts say: each has a temperature of its own. ``disturbance`` is that of a periodic
     disturbance in the samples, a kind of what is unlisted; one frequency in several records is no matter of any model, and is not
-    coarsened. ``left`` is the variance of the contrasts
-    in noise units that each set without something unlisted leaves, ``properties`` are the probabilities of effects inside the
-    class, each taken alone.
+    coarsened. ``left`` is the variance of the contrasts in noise units that each set without something unlisted leaves,
+    ``properties`` are the probabilities of effects inside the class, each taken alone.
     """
     slow = {effects: value - leaps.get(effects, 0.0) for effects, value in log_factor.items()}
     misfit = _misfits(leaps, left, calibration)

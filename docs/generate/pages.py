@@ -38,7 +38,6 @@ from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.mechanics import clearance, friction, history, part, reducer
 from backdrive_bayes.mechanics.effects import noncongruent_loops, viscoelastic_creep
 from backdrive_bayes.mechanics.registry import LIBRARY
-from backdrive_bayes.records import lines
 
 NUMBERS = {
     "thresholds": str(friction.THRESHOLDS.size),
@@ -77,10 +76,10 @@ NUMBERS = {
     "same_rate": f"{100 * same_loop.SAME_RATE:g} %",
     "smallest_gap": f"{100 * shrink.SMALLEST_GAP:g} %",
     "sure": f"{properties.SURE:g}",
-    "usual_line": f"{lines.USUAL:g}",
-    "highest_ratio": f"{lines.HIGHEST:g}",
-    "lowest_line": f"{disturbance.SIZES[0]:g}",
+    "lowest_line": f"{disturbance.SIZES[0]:.1g}",
     "highest_line": f"{disturbance.SIZES[-1]:g}",
+    "line_tolerance": f"{disturbance.TOLERANCE:g}",
+    "nyquist": f"{disturbance.NYQUIST:g}",
     "line_periods": f"{disturbance.PERIODS:g}",
     "hann": f"{disturbance.HANN:g}",
     "above": f"{traces.ABOVE:g}",

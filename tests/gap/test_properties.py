@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from backdrive_bayes.gap.properties import Branches, properties_of, unevenness
+from backdrive_bayes.gap.properties import Branches, properties_of, steps, unevenness
 
 Z = np.linspace(0.0, 1.0, 1001)
 NOISE = 1e-3
@@ -91,8 +91,17 @@ def test_slip_is_compliance_that_grows_towards_the_tip():
     assert found(loop(loading=angle(-0.2 * (Z > 0.8)), hardening=0.2))["interface_slip"].probability < 0.1
 
 
-def test_a_body_that_softens_on_both_branches_does_not_slip():
+@pytest.mark.parametrize("onset", [0.6, 0.65, 0.7])
+@pytest.mark.parametrize("softer", [0.3, 0.5])
+def test_a_body_that_softens_on_both_branches_does_not_slip(onset, softer):
     """A planted fault: the same on the loading branch alone is slip."""
-    softer, stiff = angle(0.5 * (Z > 0.7)), {"hardening": 0.0, "threshold": 0.02}
-    assert found(loop(loading=softer, unloading=angle(0.5 * (Z > 0.6)), **stiff))["interface_slip"].probability < 0.1
-    assert found(loop(loading=softer, **stiff))["interface_slip"].probability > 0.5
+    body = {"loading": angle(softer * (Z > 0.7)), "hardening": 0.0, "threshold": 0.02}
+    assert found(loop(unloading=angle(softer * (Z > onset)), **body))["interface_slip"].probability < 0.1
+    assert found(loop(**body))["interface_slip"].probability > 0.5
+
+
+def test_steps_are_linear_and_none_on_a_straight_branch():
+    straight = np.outer([1.0, 2.0], Z)
+    assert np.abs(steps(Z, straight)).max() < 1e-12
+    step = np.tile(crossed(0.1, 0.3), (2, 1))
+    assert steps(Z, step + straight) == pytest.approx(steps(Z, step))
