@@ -14,8 +14,8 @@ from scipy.ndimage import median_filter
 from scipy.special import logsumexp
 
 from backdrive_bayes.engine.jumps import residuals
-from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.log_mean import log_mean
+from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.engine.traces import TRACE, trace_probabilities
 
 RATIO = 2.0
@@ -25,7 +25,7 @@ million samples can tell."""
 TOLERANCE = 1e-3
 """How far a line's frequency, or a record's rate, is from that of all: mains hold theirs to as much."""
 PERIODS = 4
-"""Fewest periods in a leg: slower, a wave is a part of the loop's shape."""
+"""Fewest periods in a leg: of a slower wave block means leave nothing."""
 FILLED = 4
 """Ordinates of a periodogram in an independent one: zeros are filled in."""
 NEAR = 50
@@ -64,17 +64,18 @@ class Periodogram:
         return found, told
 
 
-def disturbance(linear: Linear) -> float:
+def disturbance(reduced: Reduced) -> float:
     """Log Bayes factor of a line at one frequency in time in all records over a trace of one, or none, and lines at one distance
-    in torque, each as likely."""
-    reduced = linear.reduced
-    # Every record has a zero of its own.
-    left = [rest - np.median(rest) for rest in residuals(linear)]
+    in torque, each as likely.
+
+    It is looked for in what block means leave of the samples: what is slower is a matter of the contrasts.
+    """
+    left = residuals(reduced, reduced.angles)
     spread = float(np.median([1.4826 * np.median(np.abs(rest)) for rest in left]))
     each = [periodogram(*one, spread) for one in zip(reduced.unit.records, reduced.blocks, left, strict=True)]
     rates = np.array([_ramp_rate(blocks) for blocks in reduced.blocks])
     told = np.array([one is not None for one in each]) & (rates > 0.0)
-    if spread <= 0.0 or not told.any():
+    if not told.any():
         return 0.0
     each, rates = [one for one, seen in zip(each, told, strict=True) if seen], rates[told] / rates[told].max()
     in_time, in_torque = (shared(each, spread * SIZES, scale) for scale in (np.ones(rates.size), rates))

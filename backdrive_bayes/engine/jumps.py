@@ -15,6 +15,7 @@ from scipy.special import logsumexp
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.log_mean import log_mean
 from backdrive_bayes.engine.periodic import HARMONICS
+from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
 from backdrive_bayes.engine.traces import TRACE, trace_probabilities
 
@@ -51,13 +52,12 @@ def find_jumps(linear: Linear, wave: float | None = None) -> Jumps:
     return weigh_teeth(residual_series(linear, wave))
 
 
-def residuals(linear: Linear) -> list[np.ndarray]:
-    """What the linear model leaves of every sample's angle [rad], (samples,) by record, less what the torque does beside its own
-    path from block to block."""
-    reduced, slopes = linear.reduced, linear.reduced.slopes(linear.predicted)
-    found = []
+def residuals(reduced: Reduced, angles) -> list[np.ndarray]:
+    """Every sample's angle [rad] beside the path from block to block of ``angles`` (records, blocks) in angle scales, (samples,)
+    by record, less what the torque does beside its own path."""
+    slopes, found = reduced.slopes(angles), []
     for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
-        angle = np.interp(record.time_s, blocks.mid_s, linear.predicted[r]) * reduced.angle_scale_rad
+        angle = np.interp(record.time_s, blocks.mid_s, angles[r]) * reduced.angle_scale_rad
         beside = slopes[r][block_of(record, blocks)] * between_blocks(record, blocks, noise.torque_nm)
         found.append(record.angle_rad - angle - beside)
     return found
@@ -70,7 +70,7 @@ def block_of(record, blocks) -> np.ndarray:
 
 def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
     """Residuals of each record that has enough of them."""
-    reduced, found, left = linear.reduced, [], residuals(linear)
+    reduced, found, left = linear.reduced, [], residuals(linear.reduced, linear.predicted)
     for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
         slope = np.abs(np.gradient(linear.predicted[r], blocks.mid_s))
         wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])

@@ -83,7 +83,7 @@ def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
         mode,
         {h: f.log_marginal - none for h, f in found.items()},
         {h: f.leaps for h, f in found.items() if STICK_SLIP in h},
-        disturbance(linears[0]),
+        disturbance(linears[0].reduced),
         {h: f.frequency for h, f in found.items() if f.frequency is not None},
         jumps,
         {h: f.left for h, f in found.items() if f.left is not None},
