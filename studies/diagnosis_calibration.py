@@ -45,9 +45,7 @@ second unit of this project's four benches (`studies/make_bench.py --units 60 --
 `studies/outside_bench.py --units 60 --seed 5`; its successors are `studies/second_outside_bench.py` … with 80 units and seeds
 11, 21, … 101 (the tenth with `--trace 0.33`), each written without sight of the package and run before it was looked at (what
 these first runs gave stands in docs/shown.md). Of the first two every fourth unit is here, of the third 16 of these, of the
-eighth and ninth every second (of odd number), of the tenth all. Rows of the eighth, ninth and tenth are of the code before a lag
-that smooths was exact, all others of the present one; but where neither it nor the one before found teeth, their evidence is that
-of before (between -0.7 and 0 by either), when a trace of teeth was not yet weighed."""
+eighth and ninth every second (of odd number), of the tenth all. All rows are of the present code."""
 FRESH = """`studies/eleventh_outside_bench.py --units 80 --seed 111`, written without sight of the package and run whole before it
 was looked at. With `unlisted` at -2.3, as it was then, exact was 0.69, none 0.83 and the log score -1.02."""
 HANDS = {"foreign": "foreign", "contact": "own", "mujoco": "own", "ode": "own", "sliders": "own"}

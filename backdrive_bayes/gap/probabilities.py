@@ -96,7 +96,8 @@ def _weights(slow, leaps, disturbance, misfit, temperatures, calibration) -> dic
         due = misfit[effects] if effects else least
         unlisted_prior = calibration.beside if effects else calibration.unlisted
         kinds = log(KINDS) + _of_kinds(slow.get(more, value), value, temperature), disturbance + value / temperature
-        weight[more] = logsumexp(kinds) - log(KINDS + 1) + prior + unlisted_prior + due
+        with np.errstate(invalid="ignore"):
+            weight[more] = np.logaddexp(*kinds) - log(KINDS + 1) + prior + unlisted_prior + due
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
 
