@@ -45,19 +45,22 @@ MOST = 300_000
 @dataclass(frozen=True, eq=False)
 class Periodogram:
     """Power of one record's residuals over that of the noise about each frequency, and that ``noise`` [rad²] of one of the
-    ``samples``, both (frequencies,), evenly ``step_hz`` apart; ``within_hz`` are the frequencies that can be told."""
+    ``samples``, ``step_s`` apart, both (frequencies,), evenly ``step_hz`` apart; ``within_hz`` are the frequencies that can be
+    told."""
 
     power: np.ndarray
     noise: np.ndarray
     samples: int
+    step_s: float
     step_hz: float
     within_hz: tuple[float, float]
 
     def gains(self, frequencies_hz, sizes_rad) -> tuple[np.ndarray, np.ndarray]:
         """Log Bayes factors of lines of usual root mean squares ``sizes_rad`` over noise, (sizes, frequencies), and which are
-        told."""
-        told = (frequencies_hz >= self.within_hz[0]) & (frequencies_hz <= self.within_hz[1])
-        at = np.clip(np.round(frequencies_hz[told] / self.step_hz).astype(int), 0, self.power.size - 1)
+        told; a line above half the sampling rate shows folded."""
+        folded = np.abs(frequencies_hz - np.round(frequencies_hz * self.step_s) / self.step_s)
+        told = (folded >= self.within_hz[0]) & (folded <= self.within_hz[1])
+        at = np.clip(np.round(folded[told] / self.step_hz).astype(int), 0, self.power.size - 1)
         signal = self.samples * np.square(sizes_rad)[:, None] / (2.0 * HANN * self.noise[at])
         found = np.zeros((len(sizes_rad), frequencies_hz.size))
         found[:, told] = self.power[at] * signal / (1.0 + signal) - np.log1p(signal)
@@ -107,7 +110,7 @@ def periodogram(record, blocks, rest, spread: float) -> Periodogram | None:
     noise = np.maximum(np.interp(np.arange(power.size), own, noise) if own.size else noise, np.finfo(float).tiny)
     leg_s = (blocks.end_s[-1] - blocks.begin_s[0]) / blocks.direction.size
     within = PERIODS / leg_s, NYQUIST * 0.5 / step
-    return Periodogram(power / noise, noise, even.size, 1.0 / (FILLED * even.size * step), within)
+    return Periodogram(power / noise, noise, even.size, step, 1.0 / (FILLED * even.size * step), within)
 
 
 def shared(each: list[Periodogram], sizes_rad, scale) -> np.ndarray:

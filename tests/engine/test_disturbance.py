@@ -120,6 +120,18 @@ def test_records_at_uneven_times_show_it_too():
     assert factor(wave(1.0, lambda r: 20.0), thinned) > 5
 
 
+def test_a_line_above_half_the_sampling_rate_shows_folded():
+    """A planted fault: at 40 samples a second 47 Hz show as 7, which the other record does not have."""
+
+    def coarse(unit):
+        slow = unit.records[0]
+        cut = replace(slow, time_s=slow.time_s[::10], torque_nm=slow.torque_nm[::10], angle_rad=slow.angle_rad[::10])
+        return replace(unit, records=(cut, *unit.records[1:]))
+
+    assert factor(wave(1.0, lambda r: 47.0), coarse) > 5
+    assert factor(lambda r, i: wave(1.0, lambda r: 47.0 if i else 7.0)(r, i), loops=((0.1, 0.02), (0.1, 0.1))) < 1
+
+
 def test_nothing_is_told_of_more_gaps_than_samples():
     time = np.r_[np.arange(2000), 1e7 + np.arange(2000)] / 400.0
     assert engine.periodogram(SimpleNamespace(time_s=time), None, np.zeros(4000), 1.0) is None
