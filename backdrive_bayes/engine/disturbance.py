@@ -13,12 +13,15 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.special import logsumexp
 
-from backdrive_bayes.engine.jumps import residuals
 from backdrive_bayes.engine.log_mean import log_mean
 from backdrive_bayes.engine.reduced import Reduced
+from backdrive_bayes.engine.residuals import residuals
 from backdrive_bayes.engine.traces import TRACE, trace_probabilities
+from backdrive_bayes.records.branches import find_segments
+from backdrive_bayes.records.shape import loading_rate
 
 RATIO = 2.0
+"""Ratio of neighbouring sizes, with which the evidence of a line changes little."""
 SIZES = 0.7 * RATIO ** np.arange(-8.0, 1.0)
 """Usual root mean squares of a line in spreads of the residuals, RATIO apart: from 0.67, a line without noise, to less than a
 million samples can tell."""
@@ -76,7 +79,8 @@ def disturbance(reduced: Reduced) -> float:
     left = residuals(reduced, reduced.angles)
     spread = float(np.median([1.4826 * np.median(np.abs(rest)) for rest in left]))
     each = [periodogram(*one, spread) for one in zip(reduced.unit.records, reduced.blocks, left, strict=True)]
-    rates = np.array([_ramp_rate(blocks) for blocks in reduced.blocks])
+    ramps = [(record.time_s, record.torque_nm) for record in reduced.unit.records]
+    rates = np.array([loading_rate(time, torque, find_segments(time, torque)) for time, torque in ramps])
     told = np.array([one is not None for one in each]) & (rates > 0.0)
     if not told.any():
         return 0.0
@@ -85,12 +89,6 @@ def disturbance(reduced: Reduced) -> float:
     level = TRACE * float(np.median([noise.white_rad for noise in reduced.noise]))
     trace = logsumexp(np.r_[0.0, in_time], b=trace_probabilities(spread * SIZES, RATIO, level))
     return float(log_mean(in_time) - log_mean([trace, log_mean(in_torque)]))
-
-
-def _ramp_rate(blocks) -> float:
-    """The rate at which the torque usually moves, dwells left out of account [N·m/s]."""
-    same = np.diff(blocks.leg) == 0
-    return float(np.median(np.abs(np.diff(blocks.torque_nm) / np.diff(blocks.mid_s))[same])) if same.any() else 0.0
 
 
 def periodogram(record, blocks, rest, spread: float) -> Periodogram | None:
@@ -106,8 +104,8 @@ def periodogram(record, blocks, rest, spread: float) -> Periodogram | None:
     power = np.abs(np.fft.rfft(taper * (even - even.mean()), FILLED * even.size)) ** 2 / np.sum(taper**2)
     # Ordinates that are independent of one another tell the noise, but the lowest, which went with the mean.
     own = np.arange(FILLED, power.size, FILLED)
-    noise = median_filter(power[own], 2 * NEAR + 1, mode="reflect") / np.log(2.0) if own.size else power
-    noise = np.maximum(np.interp(np.arange(power.size), own, noise) if own.size else noise, np.finfo(float).tiny)
+    noise = median_filter(power[own], 2 * NEAR + 1, mode="reflect") / np.log(2.0)
+    noise = np.maximum(np.interp(np.arange(power.size), own, noise), np.finfo(float).tiny)
     leg_s = (blocks.end_s[-1] - blocks.begin_s[0]) / blocks.direction.size
     within = PERIODS / leg_s, NYQUIST * 0.5 / step
     return Periodogram(power / noise, noise, even.size, step, 1.0 / (FILLED * even.size * step), within)

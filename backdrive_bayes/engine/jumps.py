@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.log_mean import log_mean
 from backdrive_bayes.engine.periodic import HARMONICS
-from backdrive_bayes.engine.reduced import Reduced
+from backdrive_bayes.engine.residuals import block_of, residuals
 from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
 from backdrive_bayes.engine.traces import TRACE, trace_probabilities
 
@@ -52,22 +52,6 @@ def find_jumps(linear: Linear, wave: float | None = None) -> Jumps:
     return weigh_teeth(residual_series(linear, wave))
 
 
-def residuals(reduced: Reduced, angles) -> list[np.ndarray]:
-    """Every sample's angle [rad] beside the path from block to block of ``angles`` (records, blocks) in angle scales, (samples,)
-    by record, less what the torque does beside its own path."""
-    slopes, found = reduced.slopes(angles), []
-    for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
-        angle = np.interp(record.time_s, blocks.mid_s, angles[r]) * reduced.angle_scale_rad
-        beside = slopes[r][block_of(record, blocks)] * between_blocks(record, blocks, noise.torque_nm)
-        found.append(record.angle_rad - angle - beside)
-    return found
-
-
-def block_of(record, blocks) -> np.ndarray:
-    """Number of the block of every sample, (samples,)."""
-    return np.clip(np.searchsorted(blocks.begin_s, record.time_s, side="right") - 1, 0, blocks.count.size - 1)
-
-
 def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
     """Residuals of each record that has enough of them."""
     reduced, found, left = linear.reduced, [], residuals(linear.reduced, linear.predicted)
@@ -87,14 +71,6 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
             # Correlated noise as it was estimated holds the teeth themselves.
             found.append(Teeth(series, width * step * rate, TRACE * noise.white_rad))
     return found
-
-
-def between_blocks(record, blocks, noise_nm: float) -> np.ndarray:
-    """What the torque does beside the straight path from block to block [N·m], (samples,): a torque that rises in stairs moves
-    the angle in stairs. Of what is mostly the sensor's noise the Wiener share is kept.
-    """
-    beside = record.torque_nm - np.interp(record.time_s, blocks.mid_s, blocks.torque_nm)
-    return beside * max(0.0, 1.0 - noise_nm**2 / max(float(np.mean(beside**2)), 1e-300))
 
 
 def without_wave(rest, angle, leg, frequency: float) -> np.ndarray:

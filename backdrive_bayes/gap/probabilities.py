@@ -83,6 +83,7 @@ def _hottest(log_factors, calibration) -> float:
     return calibration.cool + calibration.warm * np.sqrt(max((0.0, *log_factors)))
 
 
+@np.errstate(invalid="ignore")
 def _weights(slow, leaps, disturbance, misfit, temperatures, calibration) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects and of the same with something unlisted beside, without the operator's properties."""
     weight, least, temperature = {}, min(misfit.values()), temperatures[0]
@@ -96,8 +97,7 @@ def _weights(slow, leaps, disturbance, misfit, temperatures, calibration) -> dic
         due = misfit[effects] if effects else least
         unlisted_prior = calibration.beside if effects else calibration.unlisted
         kinds = log(KINDS) + _of_kinds(slow.get(more, value), value, temperature), disturbance + value / temperature
-        with np.errstate(invalid="ignore"):
-            weight[more] = np.logaddexp(*kinds) - log(KINDS + 1) + prior + unlisted_prior + due
+        weight[more] = np.logaddexp(*kinds) - log(KINDS + 1) + prior + unlisted_prior + due
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
 

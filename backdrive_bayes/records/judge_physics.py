@@ -51,7 +51,7 @@ def judge_rated_torque(rated_nm: float, tested_nm: float):
 
 def judge_line(line: Line | None):
     """A finding where something swings in the angle that is no noise."""
-    if line is not None and line.log_factor > 0.0:
+    if line is not None and line.disturbs:
         yield Finding(
             "warning",
             "periodic_disturbance",

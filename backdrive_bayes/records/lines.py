@@ -10,12 +10,9 @@ from backdrive_bayes.records.noise import SHORTEST_WINDOW, ChannelRecord, NoiseE
 
 NEAR = 12
 """Ordinates on either side that a line is compared with: a line leaks into two, the median of twenty-five is known to a fifth."""
-USUAL = 5.0
-"""Mean power ratio of the lines that every bench has, its resonances and its drive: eleven measured units reach 17, units of
-virtual benches 10."""
-HIGHEST = 1e5
-"""Power ratio up to which a disturbance may stand, each order of magnitude as likely: hum a hundred times the noise squared, and
-more would be seen on the screen."""
+CLEAR = 18.85
+"""Power ratio from which a line is a disturbance: lines that every bench has, of its resonances and its drive, reach 17 on eleven
+measured units and 10 on units of virtual benches."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +23,9 @@ class Line:
     power_ratio: float
 
     @property
-    def log_factor(self) -> float:
-        """Log Bayes factor of a disturbance, with a log-uniform power ratio, over the lines of any bench, with an exponential
-        one."""
-        ratio = min(self.power_ratio, HIGHEST)
-        if ratio <= 1.0:
-            return -np.inf
-        usual = -ratio / USUAL - np.log(USUAL)
-        return float(-np.log(ratio) - np.log(np.log(HIGHEST)) - usual)
+    def disturbs(self) -> bool:
+        """Whether it stands above the lines of any bench."""
+        return self.power_ratio > CLEAR
 
 
 def clearest_line(record: ChannelRecord, noise: NoiseEstimate) -> Line | None:

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from backdrive_bayes.engine.jumps import SEEN, Teeth, between_blocks, even_series, weigh_teeth, without_wave
+from backdrive_bayes.engine.jumps import SEEN, Teeth, even_series, weigh_teeth, without_wave
+from backdrive_bayes.engine.residuals import between_blocks
 from backdrive_bayes.engine.sawtooth import FAR, STRAY, Noise, Series, _holds, fit_noise, tooth_gain
 
 COUNT = 2000
