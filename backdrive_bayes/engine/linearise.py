@@ -103,7 +103,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
 
     modes = {None: joint} | {some: end for some, end in apart.items() if set(some) <= set(bent) and possible(end)}
-    modes = _reached(_in_one_class(modes, max(modes.values(), key=lambda linear: linear.log_marginal), search))
+    modes = _in_one_class(modes, max(modes.values(), key=lambda linear: linear.log_marginal), search)
+    modes = _reached(modes | {(): _with_none(modes, search)} if () in modes else modes)
     # At the joint mode a drift may stand for a wander.
     straight = modes.get((), modes[None])
     wandering, gain = learn_wander(_calm(straight))
@@ -133,6 +134,19 @@ def _in_one_class(modes, like: Linear, search) -> dict:
         there = linear if same else search(some, like).find_mode(like, linear.distortion)
         found[some] = max(linear, there, key=lambda mode: mode.log_marginal)
     return found
+
+
+def _with_none(modes, search) -> Linear:
+    """The likeliest mode where none acts that is found from there or from the others, each in its class: a law of the amplitude
+    or a class that the search of an effect came upon is not to speak for the effect."""
+    ends, begun = [modes[()]], [modes[()]]
+    for linear in modes.values():
+        start = _only(linear.distortion, ())
+        alike = (known.distortion for known in begun if known.reducer is linear.reducer and known.reduced is linear.reduced)
+        if all(_differ(start, known, linear.reduced.context) for known in alike):
+            begun.append(replace(linear, distortion=start))
+            ends.append(search((), linear).find_mode(linear, start))
+    return max(ends, key=lambda linear: linear.log_marginal)
 
 
 def _calm(linear: Linear) -> Linear:
@@ -174,6 +188,10 @@ def _apart(starts, context):
     """Starts that differ by more than the distance of knots."""
     kept = []
     for start in starts:
-        if all(length(start, other, context) > 2 * LEAST_APART * context.torque_noise for other in kept):
+        if all(_differ(start, other, context) for other in kept):
             kept.append(start)
     return kept
+
+
+def _differ(start, other, context) -> bool:
+    return length(start, other, context) > 2 * LEAST_APART * context.torque_noise

@@ -350,6 +350,20 @@ def test_modes_are_compared_in_the_class_of_the_likeliest(searching):
     assert found[("torque_offset",)].log_marginal > like.log_marginal - 5.0
 
 
+def test_a_class_that_another_search_came_upon_speaks_for_no_effect(searching):
+    """None ended in a class of few knots (planted fault), a lag that is nothing in the right one: the lag is worth nothing."""
+    free, like = searching
+    offset = replace(free, only=("torque_offset",)).find_mode(like, like.distortion)
+    few = replace(like.reducer, knots=like.reducer.knots[[0, -30, -1]])
+    none = replace(free, only=()).find_mode(free._anew(like, reducer=few), Distortion())
+    late = replace(free, only=("sensor_lag",)).find_mode(like, Distortion())
+    modes = {(): none, ("sensor_lag",): late, ("torque_offset",): offset}
+    found = engine._with_none(modes, lambda some, mode: replace(free, reduced=mode.reduced, only=some))
+    assert none.log_marginal < late.log_marginal - 20.0
+    assert abs(found.log_marginal - late.log_marginal) < 5.0
+    assert found.log_marginal < offset.log_marginal - 20.0
+
+
 @pytest.mark.parametrize("options", [{"offset_nm": 8e-4}, {"lag_s": 0.03, "loops": MORE}])
 def test_a_search_ends_where_its_own_straight_line_leads_nowhere(options):
     """Of a mode without what distorts, which misfits: there the prior scales with the noise, or good steps are refused."""
