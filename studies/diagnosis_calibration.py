@@ -114,9 +114,8 @@ def answers(row: dict, calibration: Calibration) -> dict[str, float]:
     """Probabilities of a unit's answers."""
     if "error" in row:
         return {"none": 0.0, "unknown": 0.0}
-
-    rests_on = (row[k] for k in ("log_factor", "leaps", "disturbance", "left", "properties"))
-    found = labels(probabilities(*rests_on, calibration))
+    log_factor, leaps, line, left, properties = (row[k] for k in ("log_factor", "leaps", "disturbance", "left", "properties"))
+    found = labels(probabilities(log_factor, leaps, line, left, properties, calibration))
     likeliest = next(iter(found))
     return moved_to_unknown(found, likeliest) if row.get("unsupported") and row["named"] == likeliest else found
 

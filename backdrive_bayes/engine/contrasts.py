@@ -65,6 +65,8 @@ class Contrasts:
     def joined(self, first: int, more: Contrasts) -> Contrasts:
         """The ``first`` columns and ``more``, made with the same linear model, of which what is integrated here holds too."""
         part = self.integrated
+        if part is None:
+            raise ValueError("contrasts of which nothing is integrated")
         every = part.whole.white.T @ more.white - part.whole.held.T @ more.held
         beyond = solve_triangular(part.lower, part.scale * every[part.of], lower=True, check_finite=False)
         across = (every[~part.of] - part.across.T @ beyond)[:first]

@@ -145,7 +145,8 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
     """Columns made of the class's prediction with its weights, and the share of a lag that smooths, out of ``known`` ones:
     derivatives by the parameter of every tangent effect that can be told, and even counterparts."""
     weights = {name: known[name] for name in design.names}
-    base, groups, growths, late = design.predict(weights), [], [], []
+    base, groups, growths = design.predict(weights), [], []
+    late: list[np.ndarray] = []
     grown = grown_histories(reduced, distortion)
     for effect in effects:
         if isinstance(effect, FlankEffect):

@@ -80,12 +80,12 @@ def disturbance(reduced: Reduced) -> float:
     spread = float(np.median([1.4826 * np.median(np.abs(rest)) for rest in left]))
     each = [periodogram(*one, spread) for one in zip(reduced.unit.records, reduced.blocks, left, strict=True)]
     ramps = [(record.time_s, record.torque_nm) for record in reduced.unit.records]
-    rates = np.array([loading_rate(time, torque, find_segments(time, torque)) for time, torque in ramps])
-    told = np.array([one is not None for one in each]) & (rates > 0.0)
-    if not told.any():
+    rates = [loading_rate(time, torque, find_segments(time, torque)) for time, torque in ramps]
+    told = [(one, rate) for one, rate in zip(each, rates, strict=True) if one is not None and rate > 0.0]
+    if not told:
         return 0.0
-    each, rates = [one for one, seen in zip(each, told, strict=True) if seen], rates[told] / rates[told].max()
-    in_time, in_torque = (shared(each, spread * SIZES, scale) for scale in (np.ones(rates.size), rates))
+    found, scale = [one for one, _ in told], np.array([rate for _, rate in told])
+    in_time, in_torque = (shared(found, spread * SIZES, of) for of in (np.ones(scale.size), scale / scale.max()))
     level = TRACE * float(np.median([noise.white_rad for noise in reduced.noise]))
     trace = logsumexp(np.r_[0.0, in_time], b=trace_probabilities(spread * SIZES, RATIO, level))
     return float(log_mean(in_time) - log_mean([trace, log_mean(in_torque)]))

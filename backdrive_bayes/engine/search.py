@@ -122,11 +122,13 @@ class Search:
             known, weights = (best.log_scale, best.weights) if best else ({}, None)
             return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
 
-        best, share, highest = about(distortion), 1.0, (-np.inf, None)
+        best, share = about(distortion), 1.0
+        highest = -np.inf, best
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
-                best, highest = about(best.distortion, best), (-np.inf, None)
+                best = about(best.distortion, best)
+                highest = -np.inf, best
             moved = self._moved(best)
             apart = length(moved, best.distortion, context)
             here = self._log_density(best, best.log_scale)

@@ -109,11 +109,11 @@ def _pairs(legs: list[_Leg]) -> list[tuple[_Leg, _Leg]]:
     for share in (LONG, HALF):
         both = [[leg for leg in legs if leg.sign == sign and leg.share > share] for sign in (1.0, -1.0)]
         if all(both):
-            pair = tuple(
+            up, down = (
                 _Leg(of[0].sign, max(g.first for g in of), min(g.last for g in of), np.mean([g.angle for g in of], axis=0), share)
                 for of in both
             )
-            return [pair] if _overlap(pair, 0.0) > 0.0 else []
+            return [(up, down)] if _overlap((up, down), 0.0) > 0.0 else []
     return []
 
 
