@@ -31,13 +31,15 @@ CONSPICUOUS = 3.5
 """Whitened residual beyond which the knots near a block are refined."""
 LEARNINGS = 4
 """How often the class is refined and the jitter learnt at most: a prediction made with too little jitter hides most of it."""
-STEPS = 14
-LONGEST_STEP = 2e-3
-"""Longest step of a distortion, in shares of the torque, exponents fifty times as much."""
+STEPS = 40
+"""More than a search takes: what ends it is that nothing is promised."""
 STILL = 0.1
 """Rise of the log density, as a straight line promises it, below which the search ends: knots make it rougher than that."""
-SHORTER, MOST_LENGTHENED = 0.25, 8.0
-"""Share to which a step that does not rise is shortened, and by how much one may be lengthened while they rise."""
+SPREAD, EXPONENTS = 2e-3, 50.0
+"""Standard deviation of the prior that damps a step at first, in shares of the torque, and how many times that in exponents."""
+BROKEN_PROMISE, KEPT_PROMISE, NARROWER, WIDER = 0.25, 0.75, 0.25, 2.0
+"""Share of a promised rise below which that prior is made narrower, above which it is made wider, and how many times (usual for
+trust regions: Nocedal and Wright, Numerical Optimization, 2006, ch. 4)."""
 LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"
 BENDING = {
     "torque_offset": ("offset",),
@@ -110,10 +112,11 @@ class Search:
 
     def find_mode(self, like: Linear, distortion: Distortion) -> Linear:
         """The linear model about the mode that is reached from a distortion, of the class and jitter of ``like``, and of its
-        noise where both are of the same block means: a step is taken where it raises the log density of the nonlinear parameters,
-        else it is shortened. A straight line promises more than there is, or less. Its derivatives are those at the weights of
-        the model before, at its own where a step from there was refused, so that the last model need not be the highest."""
-        context, covariances = self.reduced.context, like.covariances
+        noise where both are of the same block means: a step is taken where it raises the log density of the nonlinear parameters.
+        A straight line promises more than there is, or less, and is trusted as far as it kept its promise; the search ends
+        where it promises nothing so far. Its derivatives are those at the weights of the model before, at its own where a step
+        from there was refused, so that the last model need not be the highest."""
+        covariances = like.covariances
         if self.reduced is not like.reduced:
             covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
         idle: set[str] = set()
@@ -122,24 +125,25 @@ class Search:
             known, weights = (best.log_scale, best.weights) if best else ({}, None)
             return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
 
-        best, share = about(distortion), 1.0
+        best, spread, refused = about(distortion), SPREAD, False
         highest = -np.inf, best
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
-                best = about(best.distortion, best)
+                best, refused = about(best.distortion, best), False
                 highest = -np.inf, best
-            moved = self._moved(best)
-            apart = length(moved, best.distortion, context)
-            here = self._log_density(best, best.log_scale)
+            moved, here = self._moved(best, spread), self._log_density(best, best.log_scale)
             highest = (here, best) if here >= highest[0] else highest
-            if share * (self._log_density(best, best.log_scale, moved) - here) < STILL:
+            promised = self._log_density(best, best.log_scale, moved) - here
+            if not promised >= STILL:
                 break
-            tried = about(_towards(best.distortion, moved, min(share, LONGEST_STEP / apart)), best)
-            if self._log_density(tried, best.log_scale) < here:
-                best, share = about(best.distortion, best), SHORTER * share
-            else:
-                best, share = tried, min(MOST_LENGTHENED, 2.0 * share)
+            tried = about(moved, best)
+            kept = (self._log_density(tried, best.log_scale) - here) / promised
+            spread *= NARROWER if not kept >= BROKEN_PROMISE else WIDER if kept > KEPT_PROMISE else 1.0
+            if kept > 0.0:
+                best, refused = tried, False
+            elif not refused:
+                best, refused = about(best.distortion, best), True
         return best if self._log_density(best, best.log_scale) >= highest[0] else highest[1]
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
@@ -210,12 +214,18 @@ class Search:
         found = (e for e in self.effects if isinstance(e, TangentEffect) and e.one_way and e.name in linear.weights)
         return {e.name for e in found if linear.weights[e.name][0] < 0.0}
 
-    def _moved(self, linear):
-        weights = linear.weights
-        tangent = {
-            e.parameter: float(weights[e.name][0]) for e in self.effects if isinstance(e, TangentEffect) and e.name in weights
-        }
-        return replace(linear.distortion, **tangent)
+    def _moved(self, linear, spread: float) -> Distortion:
+        """The distortion that a straight line promises most of, where one more prior about the present one has ``spread`` for its
+        standard deviation, in the units of :func:`length`."""
+        here, design, units = linear.distortion, linear.design, _units(linear.distortion, self.reduced.context)
+        row = {name: int(np.argmax(design.index == k)) for k, name in enumerate(design.names)}
+        effects = [e for e in self.effects if isinstance(e, TangentEffect) and e.name in row]
+        rows, unit = [row[e.name] for e in effects], np.array([units[e.parameter] for e in effects])
+        root, value = linear.solution.root[rows], np.array([getattr(here, e.parameter) for e in effects])
+        # With the covariance C of the parameters and D of the prior, (1/C + 1/D)⁻¹ 1/C = (1 + C/D)⁻¹ (Levenberg, Marquardt).
+        damped = np.eye(unit.size) + linear.solution.variance * root @ root.T / (spread * unit) ** 2
+        moved = value + np.linalg.solve(damped, linear.solution.mean[rows] - value)
+        return replace(here, **dict(zip([e.parameter for e in effects], moved.tolist(), strict=True)))
 
 
 def _shift(design, distortion, effects, context):
@@ -231,20 +241,15 @@ def _shift(design, distortion, effects, context):
     return found
 
 
-def _step(moved, distortion, context):
-    """Step in shares of the torque scale; exponents weigh a fiftieth."""
-    step = np.array([getattr(moved, n) - getattr(distortion, n) for n in vars(distortion)])
-    return step * [1.0, context.rate.max(), *[0.02] * (step.size - 2)]
+def _units(distortion, context) -> dict[str, float]:
+    """What counts as a step of one by parameter: the torque scale, a lag that makes as much of it, or EXPONENTS."""
+    return dict.fromkeys(vars(distortion), EXPONENTS) | {"offset": 1.0, "lag_s": 1.0 / context.rate.max()}
 
 
 def length(moved, distortion, context) -> float:
     """Largest part of the step between two distortions, in shares of the torque scale."""
-    return float(np.abs(_step(moved, distortion, context)).max())
-
-
-def _towards(distortion, moved, share: float) -> Distortion:
-    """A distortion on the way to another."""
-    return Distortion(**{n: v + share * (getattr(moved, n) - v) for n, v in vars(distortion).items()})
+    units = _units(distortion, context)
+    return max(abs(getattr(moved, n) - getattr(distortion, n)) / unit for n, unit in units.items())
 
 
 def _finer(linear) -> ReducerClass:

@@ -1,5 +1,6 @@
 """The mode: planted offset, lag and jitter are found, knots are refined where loops are steep, a clean unit is left clean."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.mechanics.clearance import HALVINGS
-from backdrive_bayes.mechanics.effect import Distortion
+from backdrive_bayes.mechanics.effect import Distortion, TangentEffect
 from backdrive_bayes.mechanics.effects import noncongruent_loops
 from backdrive_bayes.mechanics.reducer import BASELINE, ReducerClass
 from backdrive_bayes.mechanics.registry import LIBRARY, library_terms
@@ -325,17 +326,43 @@ def test_the_mode_is_reached_from_afar(searching, offset):
     assert free._log_density(ended, best.log_scale) > free._log_density(like, best.log_scale) - 2.0
 
 
-def test_a_step_that_promises_too_much_is_shortened(searching, monkeypatch):
+def test_a_line_that_breaks_its_promise_is_trusted_less_far(searching, monkeypatch):
     """Steps go ten times as far as they lead; where all are taken (planted fault), the mode is not found."""
     free, like = searching
-    right, density = search._towards, search.Search._log_density
-    monkeypatch.setattr(search, "_towards", lambda here, there, share: right(here, there, 10.0 * share))
+    right, density = search.tangent_groups, search.Search._log_density
+
+    def weak(*given):
+        groups = right(*given)
+        return tuple(replace(g, columns=tuple(0.1 * c for c in g.columns)) if g.name == "torque_offset" else g for g in groups)
+
+    monkeypatch.setattr(search, "tangent_groups", weak)
     start = replace(like.distortion, offset=like.distortion.offset + 6e-4)
     best = free.find_mode(like, start)
     assert best.distortion.offset == pytest.approx(-3e-4 / SCALE, abs=3e-4)
-    monkeypatch.setattr(search.Search, "_log_density", lambda self, linear, scale, at=None: float(at is not None))
+    tick = itertools.count()
+    monkeypatch.setattr(search.Search, "_log_density", lambda *given, **named: float(next(tick)))
     wild = free.find_mode(like, start)
     assert density(free, wild, best.log_scale) < density(free, best, best.log_scale) - 10.0
+
+
+def test_a_damped_step_is_the_mode_beside_one_more_prior(searching):
+    """Against the product of the two normal densities, which other units of the exponents (planted fault) miss."""
+    free, like = searching
+    start = replace(like.distortion, offset=2e-3, friction_exponent=0.1)
+    linear = free._linear(like.reducer, start, like.covariances, like.log_scale, like.jitter, set(), like.weights)
+    effects = [e for e in free.effects if isinstance(e, TangentEffect) and e.name in linear.design.names]
+    rows = np.concatenate([np.flatnonzero(linear.design.index == linear.design.names.index(e.name)) for e in effects])
+    root, at = linear.solution.root[rows], np.array([getattr(start, e.parameter) for e in effects])
+    known = np.linalg.inv(linear.solution.variance * root @ root.T)
+    units = {"offset": 1.0, "lag_s": 1.0 / free.reduced.context.rate.max()}
+
+    def far(spread, exponents):
+        prior = np.diag([(spread * units.get(e.parameter, exponents)) ** -2.0 for e in effects])
+        mode = np.linalg.solve(known + prior, known @ linear.solution.mean[rows] + prior @ at)
+        moved = np.array([getattr(free._moved(linear, spread), e.parameter) for e in effects])
+        return float(np.max(np.abs(moved - mode) / np.abs(mode - at)))
+
+    assert all(far(spread, 50.0) < 1e-4 for spread in (1e-5, 1e-4, 1e-2)) and far(1e-5, 10.0) > 0.1
 
 
 def test_modes_are_compared_in_the_class_of_the_likeliest(searching):
