@@ -153,7 +153,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
             groups.append(Group(effect.name, tuple(reducer.flank_columns(h, weights, growth) for h, growth in grown)))
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
-            share = float(known[effect.name][0]) if effect.name in known else 0.0
+            share = effect.usual(reduced.context) + (float(known[effect.name][0]) if effect.name in known else 0.0)
             # What is smoothed grows with the lag as well, whose column is the one before.
             groups[-1] = _columns(groups[-1].name, [by + share * more for by, more in zip(late, growth, strict=True)])
             groups.append(_columns(effect.name, smoothed))

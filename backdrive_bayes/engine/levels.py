@@ -22,7 +22,7 @@ def levels(linear: Linear, hypothesis: tuple[str, ...], off: tuple[str, ...] = (
     """Mean and standard deviation of each group's log scale: effects of the hypothesis are free, those that are ``off`` leave not
     even a trace, all others are at trace level."""
     priors = class_priors(linear.reducer)
-    present, gone = ({t.name for n in names for t in all_effects().get(n, ())} for names in (hypothesis, off))
+    present, gone = ({t.name for n in names for t in all_effects().get(n, ()) if not t.always} for names in (hypothesis, off))
     traces = trace_levels(linear.reduced, linear.design, linear.effects)
     for effect in (e for e in linear.effects if e.name in traces):
         on, level = effect.name in present, traces[effect.name]

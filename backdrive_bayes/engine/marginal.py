@@ -196,8 +196,9 @@ class Scales:
         return float(-0.5 * np.sum(((log_scale[free] - self.mean[free]) / self.sd[free]) ** 2))
 
 
-def find_scales(data: Whitened, scales: Scales, start=None) -> tuple[np.ndarray, Solution]:
-    """Mode of the log scales by Newton steps with the exact Hessian; the curvature is at least that of the widest prior."""
+def find_scales(data: Whitened, scales: Scales, start=None, sweeps: int = SWEEPS) -> tuple[np.ndarray, Solution]:
+    """Mode of the log scales by Newton steps with the exact Hessian, or ``sweeps`` steps towards it; the curvature is at least
+    that of the widest prior."""
     log_scale = np.array(scales.mean if start is None else start, float)
     held = ~scales.free[scales.group]
     known, group = Known.of(data.moments, held, scales.of_weights(log_scale)[held]).left, scales.group[~held]
@@ -205,7 +206,7 @@ def find_scales(data: Whitened, scales: Scales, start=None) -> tuple[np.ndarray,
     first = np.flatnonzero(np.diff(group, prepend=-1))
     at = group[first]
     mean, precision = scales.mean[at], 1.0 / scales.sd[at] ** 2
-    for _ in range(SWEEPS if at.size else 0):
+    for _ in range(sweeps if at.size else 0):
         gradient, curvature = _slopes(known, scales.of_weights(log_scale)[~held], first)
         gradient -= precision * (log_scale[at] - mean)
         # A scale that is pressed against the end of its range stays there.

@@ -10,13 +10,12 @@ from backdrive_bayes.engine.design import Group, class_groups, class_priors, his
 from backdrive_bayes.engine.flanks import select_flank
 from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
 from backdrive_bayes.engine.linear import Linear
-from backdrive_bayes.engine.marginal import find_scales, whiten
+from backdrive_bayes.engine.marginal import SWEEPS, find_scales, whiten
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.mechanics.clearance import place_knots, spaced
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
-from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.mechanics.registry import all_effects
@@ -33,8 +32,8 @@ LEARNINGS = 4
 """How often the class is refined and the jitter learnt at most: a prediction made with too little jitter hides most of it."""
 STEPS = 40
 """More than a search takes: what ends it is that nothing is promised."""
-STILL = 0.1
-"""Rise of the log density, as a straight line promises it, below which the search ends: knots make it rougher than that."""
+STILL = 0.3
+"""Rise of the log density, as a straight line promises it, below which the search ends: knots make it as rough as that."""
 SPREAD, EXPONENTS = 2e-3, 50.0
 """Standard deviation of the prior that damps a step at first, in shares of the torque, and how many times that in exponents."""
 BROKEN_PROMISE, KEPT_PROMISE, NARROWER, WIDER = 0.25, 0.75, 0.25, 2.0
@@ -115,15 +114,16 @@ class Search:
         noise where both are of the same block means: a step is taken where it raises the log density of the nonlinear parameters.
         A straight line promises more than there is, or less, and is trusted as far as it kept its promise; the search ends
         where it promises nothing so far. Its derivatives are those at the weights of the model before, at its own where a step
-        from there was refused, so that the last model need not be the highest."""
+        from there was refused, so that the last model need not be the highest. Scales take a step towards their mode with each of
+        the parameters, and all that are left at the end."""
         covariances = like.covariances
         if self.reduced is not like.reduced:
             covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
         idle: set[str] = set()
 
         def about(at: Distortion, best: Linear | None = None) -> Linear:
-            known, weights = (best.log_scale, best.weights) if best else ({}, None)
-            return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights)
+            known, weights, sweeps = (best.log_scale, best.weights, 1) if best else ({}, None, SWEEPS)
+            return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights, sweeps)
 
         best, spread, refused = about(distortion), SPREAD, False
         highest = -np.inf, best
@@ -139,12 +139,17 @@ class Search:
                 break
             tried = about(moved, best)
             kept = (self._log_density(tried, best.log_scale) - here) / promised
-            spread *= NARROWER if not kept >= BROKEN_PROMISE else WIDER if kept > KEPT_PROMISE else 1.0
+            if not kept >= BROKEN_PROMISE:
+                # A prior wider than the step was long did not damp it.
+                spread = NARROWER * min(spread, length(moved, best.distortion, self.reduced.context))
+            elif kept > KEPT_PROMISE:
+                spread *= WIDER
             if kept > 0.0:
                 best, refused = tried, False
             elif not refused:
                 best, refused = about(best.distortion, best), True
-        return best if self._log_density(best, best.log_scale) >= highest[0] else highest[1]
+        best = best if self._log_density(best, best.log_scale) >= highest[0] else highest[1]
+        return self._solved(best, best.log_scale, idle)
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
         """Log density of the data and a distortion, by default its own, at known log scales, up to a constant."""
@@ -164,29 +169,43 @@ class Search:
             torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], history.log_amplitude, context)[1]))
         return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
-    def _linear(self, reducer, distortion, covariances, known, jitter, idle, weights=None):
+    def _linear(self, reducer, distortion, covariances, known, jitter, idle, weights=None, sweeps=SWEEPS):
         """The linear model about a distortion; derivatives are those at ``weights``, by default the ones that fit best there."""
         core = class_groups(self.reduced, reducer, distortion)
         paths = (path_group(self.reduced, effect, distortion) for effect in self.effects if isinstance(effect, PathEffect))
         beside = (*paths, *self.fixed)
         if weights is None:
             plain = core.joined(*beside)
-            weights = plain.split(self._solve(reducer, plain, self.reduced.angles, covariances, known)[2].mean)
+            data = self._whitened(plain, self.reduced.angles, covariances)
+            weights = plain.split(self._solve(reducer, plain, data, known)[1].mean)
         tangents = tangent_groups(self.reduced, reducer, core, distortion, weights, self.effects)
         design = core.joined(*beside, *tangents)
         shift = _shift(design, distortion, self.effects, self.reduced.context)
         angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
-        data, log_scale, solution = self._solve(reducer, design, angles, covariances, known, idle)
-        named = dict(zip(design.names, log_scale, strict=True))
-        explained = design.predict(design.split(solution.mean))
-        predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
-        waves = {n: w for n, w in design.split(solution.mean).items() if n == WAVE}
-        waving = tuple(w + np.zeros(a.size) for w, a in zip(design.predict(waves), angles, strict=True))
+        data = self._whitened(design, angles, covariances)
+        log_scale, solution = self._solve(reducer, design, data, known, idle, sweeps)
         shared = (self.reduced, reducer, distortion, design, self.effects, angles, tuple(covariances), data)
-        return Linear(*shared, named, solution, jitter, predicted, waving)
+        return self._predicting(Linear(*shared, log_scale, solution, jitter, (), ()))
 
-    def _solve(self, reducer, design, angles, covariances, known, idle=frozenset()):
-        """Whitened data, log scales and weights; ``known`` log scales by name are where the search begins."""
+    def _solved(self, linear: Linear, known, idle) -> Linear:
+        """The same model at the mode of its log scales."""
+        log_scale, solution = self._solve(linear.reducer, linear.design, linear.data, known, idle)
+        return self._predicting(replace(linear, log_scale=log_scale, solution=solution))
+
+    def _predicting(self, linear: Linear) -> Linear:
+        """The same with what its weights predict."""
+        shift = _shift(linear.design, linear.distortion, self.effects, self.reduced.context)
+        explained = linear.design.predict(linear.weights)
+        predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
+        waves = {n: w for n, w in linear.weights.items() if n == WAVE}
+        waving = tuple(w + np.zeros(a.size) for w, a in zip(linear.design.predict(waves), linear.angles, strict=True))
+        return replace(linear, predicted=predicted, waving=waving)
+
+    def _whitened(self, design, angles, covariances):
+        return whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)
+
+    def _solve(self, reducer, design, data, known, idle=frozenset(), sweeps=SWEEPS):
+        """Log scales by name and weights, at their mode or ``sweeps`` steps towards it from the ``known`` ones by name."""
         priors = class_priors(reducer)
         traces = trace_levels(self.reduced, design, self.effects)
         for effect in (e for e in self.effects if e.name in traces):
@@ -194,17 +213,17 @@ class Search:
             level = effect.present(self.reduced.context) if free else traces[effect.name]
             priors[effect.name] = (float(np.log(level)), WIDE if free and not effect.of_class else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
-        data = whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)
         scales = design.scales(priors)
         start = np.array([known.get(name, mean) for name, mean in zip(design.names, scales.mean, strict=True)])
-        return data, *find_scales(data, scales, np.where(scales.free, start, scales.mean))
+        log_scale, solution = find_scales(data, scales, np.where(scales.free, start, scales.mean), sweeps)
+        return dict(zip(design.names, log_scale, strict=True)), solution
 
     def _acts(self, effect) -> bool:
         """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these."""
         if effect.of_class:
             return True
-        if effect is BENCH_HYSTERESIS or self.only is None:
-            return effect is not BENCH_HYSTERESIS
+        if effect.always or self.only is None:
+            return not effect.always
         # A creep may stand for a law of the rate: where that acts, it is weighed without.
         still = {*BENDING, CREEP} if LAW in self.only else {*BENDING}
         return effect in {t for n, terms in all_effects().items() if n in self.only or n not in still for t in terms}
@@ -229,15 +248,11 @@ class Search:
 
 
 def _shift(design, distortion, effects, context):
-    """What the tangent effects' columns make of the distortion itself, less the bench's usual friction."""
+    """What the tangent effects' columns make of the distortion itself, less what the others usually are."""
     found = [0.0] * len(design.groups[0].columns)
-    for effect in effects:
-        if isinstance(effect, TangentEffect) and effect.name in design.names:
-            group = design.group(effect.name)
-            found = [f + c[:, 0] * getattr(distortion, effect.parameter) for f, c in zip(found, group.columns, strict=True)]
-        if effect is BENCH_HYSTERESIS:
-            group = design.group(effect.name)
-            found = [f - c[:, 0] * BENCH_HYSTERESIS.usual(context) for f, c in zip(found, group.columns, strict=True)]
+    for effect in (e for e in effects if e.name in design.names and (e.always or isinstance(e, TangentEffect))):
+        size = getattr(distortion, effect.parameter) if isinstance(effect, TangentEffect) else -effect.usual(context)
+        found = [f + c[:, 0] * size for f, c in zip(found, design.group(effect.name).columns, strict=True)]
     return found
 
 

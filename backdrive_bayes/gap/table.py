@@ -80,7 +80,8 @@ class Table:
         usual |= {"uneven": AMPLITUDE, "ratchet": AMPLITUDE, "shape": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
-        self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
+        self.terms = {n: tuple(e.name for e in terms if not e.always) for n, terms in all_effects().items()}
+        self.terms[UNEXPLAINED] = (UNEXPLAINED,)
         one_way = [n for n, e in effects.items() if isinstance(e, TangentEffect) and e.one_way and n in self.names]
         self.one_way = {n: np.flatnonzero(self.index == self.names.index(n)).tolist() for n in one_way}
         self.jumps = jumps

@@ -50,12 +50,14 @@ class Effect:
     """A candidate effect.
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
-    channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it.
+    channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it, ``always``
+    whether its prior is the same whatever acts, with ``usual`` for its mean.
     ``present`` gives the standard deviation of its (independent) weights where it acts; where it is a mere trace, as on every
     bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
 
     of_class: ClassVar[bool] = False
+    always: ClassVar[bool] = False
     name: str
     breaks: str
     signature: str
@@ -67,6 +69,10 @@ class Effect:
     def present(self, context: Context) -> float:
         """Typical standard deviation of the weights where the effect acts."""
         raise NotImplementedError
+
+    def usual(self, context: Context) -> float:
+        """Mean of the weights' prior, from which they are counted."""
+        return 0.0
 
 
 @dataclass(frozen=True)

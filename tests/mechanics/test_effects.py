@@ -22,6 +22,7 @@ from backdrive_bayes.mechanics.effect import (
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import SIZE as BENCH_FRICTION
+from backdrive_bayes.mechanics.effects.sensor_lag import LAG_SPREAD
 from backdrive_bayes.mechanics.effects.viscoelastic_creep import BEFORE
 from backdrive_bayes.mechanics.history import behind, through
 from backdrive_bayes.mechanics.part import TOP
@@ -265,12 +266,19 @@ def test_the_lag_is_the_derivative_of_what_is_delayed_and_what_is_smoothed():
         return [d + share * s[:, 0] for d, s in zip(delayed, smoothed, strict=True)]
 
     below, above = (predicted(Distortion(lag_s=lag + sign * step)) for sign in (-1.0, 1.0))
-    known = weights() | {"lag_spread": np.array([share])}
-    both, alone = (tangents(reduced, Distortion(lag_s=lag), of, "sensor_lag")["sensor_lag"] for of in (known, weights()))
+    known, delay = (weights() | {"lag_spread": np.array([s - LAG_SPREAD.usual(CONTEXT)])} for s in (share, 0.0))
+    both, alone = (tangents(reduced, Distortion(lag_s=lag), of, "sensor_lag")["sensor_lag"] for of in (known, delay))
     for r, (low, high) in enumerate(zip(below, above, strict=True)):
         quotient = (high - low) / (2.0 * step)
         off, without = (np.sqrt(np.mean((columns[r][:, 0] - quotient)[30:] ** 2)) for columns in (both, alone))
         assert off < 0.15 * np.abs(quotient[30:]).max() and off < 0.5 * without
+
+
+def test_any_share_of_a_lag_may_smooth():
+    """Mean and standard deviation are those of shares from none to all, each as likely; the same whatever acts."""
+    share = np.random.default_rng(0).uniform(size=200_000)
+    assert LAG_SPREAD.usual(CONTEXT) == pytest.approx(share.mean(), abs=3e-3) and LAG_SPREAD.always
+    assert LAG_SPREAD.present(CONTEXT) == pytest.approx(share.std(), abs=3e-3)
 
 
 def test_what_is_smoothed_is_what_a_filter_makes_of_the_prediction():

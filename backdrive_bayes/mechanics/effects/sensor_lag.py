@@ -26,11 +26,17 @@ SENSOR_LAG = SensorLag(
 
 
 class LagSpread(SpreadEffect):
-    """How much of the lag is a first-order one: 0 for a pure delay, 1 where all of it smooths."""
+    """How much of the lag is a first-order one: 0 for a pure delay, 1 where all of it smooths, all between as likely."""
+
+    always = True
+
+    def usual(self, context):
+        """Mean of the prior."""
+        return 0.5
 
     def present(self, context):
-        """Half of it."""
-        return 0.5
+        """Standard deviation of the prior."""
+        return 1.0 / 12.0**0.5
 
 
 LAG_SPREAD = LagSpread(
