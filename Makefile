@@ -11,29 +11,36 @@ export MPLBACKEND := Agg
 
 .PHONY: demo test docs lint versions clean
 
-demo: $(VENV)/ready
+demo: $(VENV)/demo
 	$(BIN)/backdrive-bayes demo
 	cp reports/demo/reducer-1/figures/loop-2.png reports/demo/loop.png
 
-test: $(VENV)/ready
+test: $(VENV)/test
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-docs: $(VENV)/ready
+docs: $(VENV)/test
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 
-lint: $(VENV)/ready
+lint: $(VENV)/test
 	$(BIN)/python -m pip install --quiet ruff mypy pandas-stubs scipy-stubs
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
-versions: $(VENV)/ready
+versions: $(VENV)/test
 	$(BIN)/python studies/versions.py --out reports/versions
 
-$(VENV)/ready: pyproject.toml
+define set_up
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "Python 3.11 or newer is needed: make PYTHON=python3.11"'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --editable '.[$(1)]'
 	touch $@
+endef
+
+$(VENV)/demo: pyproject.toml
+	$(call set_up,demo)
+
+$(VENV)/test: pyproject.toml
+	$(call set_up,test)
 
 clean:
 	rm -rf $(VENV) build *.egg-info

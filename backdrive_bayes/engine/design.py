@@ -21,7 +21,7 @@ from backdrive_bayes.mechanics.effect import (
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.history import LEAST_RANGE, History, behind, of_blocks
-from backdrive_bayes.mechanics.reducer import ReducerClass
+from backdrive_bayes.mechanics.reducer import GROWING, ReducerClass
 
 UNDISTORTED = Distortion()
 STEP = 2e-5
@@ -85,8 +85,8 @@ class Design:
         return dict(zip(self.names, np.split(weights, ends[:-1]), strict=True))
 
     def predict(self, weights: Mapping[str, np.ndarray], names=None) -> list[np.ndarray]:
-        """Sum of the named groups' columns times their weights at each record's blocks."""
-        used = [g for g in self.groups if g.name in (names or weights)]
+        """Sum of the named groups' columns times their weights at each record's blocks, of all that have weights by default."""
+        used = [g for g in self.groups if g.name in (weights if names is None else names)]
         return [sum(g.of_record(r) @ weights[g.name] for g in used) for r in range(len(self.groups[0].columns))]
 
     def scales(self, priors: Mapping[str, tuple[float, float]]) -> Scales:
@@ -153,9 +153,10 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
             groups.append(Group(effect.name, tuple(reducer.flank_columns(h, weights, growth) for h, growth in grown)))
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
-            share = effect.usual(reduced.context) + (float(known[effect.name][0]) if effect.name in known else 0.0)
-            # What is smoothed grows with the lag as well, whose column is the one before.
-            groups[-1] = _columns(groups[-1].name, [by + share * more for by, more in zip(late, growth, strict=True)])
+            share = float(known[effect.name][0]) if effect.name in known else 0.0
+            # A longer lag smooths more, less what makes the share smaller: as much of it is first-order, and none without a lag.
+            longer = [more - at / max(distortion.lag_s, STEP) for more, at in zip(growth, smoothed, strict=True)]
+            groups[-1] = _columns(groups[-1].name, [by + share * more for by, more in zip(late, longer, strict=True)])
             groups.append(_columns(effect.name, smoothed))
         if effect is BENCH_HYSTERESIS:
             # A lag moves the torque by rate times lag, friction of the bench by the same amount at every rate.
@@ -168,12 +169,15 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
             late = by if effect.parameter == "lag_s" else late
             groups.append(_columns(effect.name, by))
     for part in (0, 1):
-        groups += _growth_groups(reduced, reducer, grown, weights, [e for e in growths if e.part == part])
+        own = [e for e in growths if e.part == part]
+        here = design.predict(weights, {n for n in GROWING[part] if n in weights}) if own else base
+        groups += _growth_groups(reduced, reducer, grown, weights, own, here)
     return tuple(groups)
 
 
-def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
-    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion."""
+def _growth_groups(reduced, reducer, grown, weights, effects, here) -> list[Group]:
+    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion;
+    ``here`` is what the part makes as it is."""
 
     def laws(along):
         rates = zip(reduced.context.log_rate, along, strict=True)
@@ -182,8 +186,8 @@ def _growth_groups(reduced, reducer, grown, weights, effects) -> list[Group]:
     read = laws(histories(reduced, UNDISTORTED))
     identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in read])) > LEAST_RANGE]
     columns = [
-        reducer.grown(history, weights, growth, identified[0].part, [law[e.term] for e in identified])
-        for (history, growth), law in zip(grown, laws([history for history, _ in grown]), strict=True)
+        reducer.grown(history, weights, growth, identified[0].part, [law[e.term] for e in identified], here=own)
+        for (history, growth), law, own in zip(grown, laws([history for history, _ in grown]), here, strict=True)
         if identified
     ]
     return [_columns(e.name, of) for e, of in zip(identified, zip(*columns, strict=True), strict=True)]

@@ -19,10 +19,10 @@ PRESENT_SD = 1.0
 
 
 def levels(linear: Linear, hypothesis: tuple[str, ...], off: tuple[str, ...] = ()) -> dict[str, tuple[float, float]]:
-    """Mean and standard deviation of each group's log scale: effects of the hypothesis are free, those that are ``off`` leave not
-    even a trace, all others are at trace level."""
+    """Mean and standard deviation of each group's log scale: effects of the hypothesis are free, or as large as is known, those
+    that are ``off`` leave not even a trace, all others are at trace level."""
     priors = class_priors(linear.reducer)
-    present, gone = ({t.name for n in names for t in all_effects().get(n, ()) if not t.always} for names in (hypothesis, off))
+    present, gone = ({t.name for n in names for t in all_effects().get(n, ())} for names in (hypothesis, off))
     traces = trace_levels(linear.reduced, linear.design, linear.effects)
     for effect in (e for e in linear.effects if e.name in traces):
         on, level = effect.name in present, traces[effect.name]
@@ -30,7 +30,8 @@ def levels(linear: Linear, hypothesis: tuple[str, ...], off: tuple[str, ...] = (
             level = effect.present(linear.reduced.context)
         elif on:
             level = usual_level(effect, linear.reduced.context, level)
-        priors[effect.name] = OFF if effect.name in gone else (float(np.log(level)), PRESENT_SD if on else 0.0)
+        sd = PRESENT_SD if on and not effect.known else 0.0
+        priors[effect.name] = OFF if effect.name in gone else (float(np.log(level)), sd)
     for name in linear.design.names:
         priors.setdefault(name, (float(np.log(6e-3)), PRESENT_SD))
     return priors

@@ -16,6 +16,7 @@ from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.traces import trace_levels
 from backdrive_bayes.mechanics.clearance import place_knots, spaced
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.mechanics.registry import all_effects
@@ -113,43 +114,40 @@ class Search:
         """The linear model about the mode that is reached from a distortion, of the class and jitter of ``like``, and of its
         noise where both are of the same block means: a step is taken where it raises the log density of the nonlinear parameters.
         A straight line promises more than there is, or less, and is trusted as far as it kept its promise; the search ends
-        where it promises nothing so far. Its derivatives are those at the weights of the model before, at its own where a step
-        from there was refused, so that the last model need not be the highest. Scales take a step towards their mode with each of
-        the parameters, and all that are left at the end."""
+        where it promises nothing so far. Its derivatives are those at the weights of the model before, and scales take one step
+        towards their mode with each of the parameters; where a step was refused, and where nothing is promised, derivatives are
+        made anew at the model's own weights, and scales take all that are left."""
         covariances = like.covariances
         if self.reduced is not like.reduced:
             covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
         idle: set[str] = set()
 
-        def about(at: Distortion, best: Linear | None = None) -> Linear:
-            known, weights, sweeps = (best.log_scale, best.weights, 1) if best else ({}, None, SWEEPS)
-            return self._linear(like.reducer, at, covariances, known, like.jitter, idle, weights, sweeps)
+        def about(at: Distortion, best: Linear, sweeps: int) -> Linear:
+            return self._linear(like.reducer, at, covariances, best.log_scale, like.jitter, idle, best.weights, sweeps)
 
-        best, spread, refused = about(distortion), SPREAD, False
-        highest = -np.inf, best
+        best, spread, own = self._linear(like.reducer, distortion, covariances, {}, like.jitter, idle), SPREAD, False
         for _ in range(STEPS):
             if not idle >= (backward := self._backward(best)):
                 idle |= backward
-                best, refused = about(best.distortion, best), False
-                highest = -np.inf, best
+                best, own = about(best.distortion, best, SWEEPS), True
             moved, here = self._moved(best, spread), self._log_density(best, best.log_scale)
-            highest = (here, best) if here >= highest[0] else highest
             promised = self._log_density(best, best.log_scale, moved) - here
-            if not promised >= STILL:
+            if promised >= STILL:
+                tried = about(moved, best, 1)
+                kept = (self._log_density(tried, best.log_scale) - here) / promised
+                if not kept >= BROKEN_PROMISE:
+                    # A prior wider than the step was long did not damp it.
+                    spread = NARROWER * min(spread, length(moved, best.distortion, self.reduced.context))
+                elif kept > KEPT_PROMISE:
+                    spread *= WIDER
+                if kept > 0.0:
+                    best, own = tried, False
+                    continue
+            elif own:
                 break
-            tried = about(moved, best)
-            kept = (self._log_density(tried, best.log_scale) - here) / promised
-            if not kept >= BROKEN_PROMISE:
-                # A prior wider than the step was long did not damp it.
-                spread = NARROWER * min(spread, length(moved, best.distortion, self.reduced.context))
-            elif kept > KEPT_PROMISE:
-                spread *= WIDER
-            if kept > 0.0:
-                best, refused = tried, False
-            elif not refused:
-                best, refused = about(best.distortion, best), True
-        best = best if self._log_density(best, best.log_scale) >= highest[0] else highest[1]
-        return self._solved(best, best.log_scale, idle)
+            if not own:
+                best, own = about(best.distortion, best, SWEEPS), True
+        return best if own else about(best.distortion, best, SWEEPS)
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
         """Log density of the data and a distortion, by default its own, at known log scales, up to a constant."""
@@ -184,22 +182,12 @@ class Search:
         angles = tuple(a + s for a, s in zip(self.reduced.angles, shift, strict=True))
         data = self._whitened(design, angles, covariances)
         log_scale, solution = self._solve(reducer, design, data, known, idle, sweeps)
+        weights = design.split(solution.mean)
+        predicted = tuple(p - s for p, s in zip(design.predict(weights), shift, strict=True))
+        waves = {n: w for n, w in weights.items() if n == WAVE}
+        waving = tuple(w + np.zeros(a.size) for w, a in zip(design.predict(waves), angles, strict=True))
         shared = (self.reduced, reducer, distortion, design, self.effects, angles, tuple(covariances), data)
-        return self._predicting(Linear(*shared, log_scale, solution, jitter, (), ()))
-
-    def _solved(self, linear: Linear, known, idle) -> Linear:
-        """The same model at the mode of its log scales."""
-        log_scale, solution = self._solve(linear.reducer, linear.design, linear.data, known, idle)
-        return self._predicting(replace(linear, log_scale=log_scale, solution=solution))
-
-    def _predicting(self, linear: Linear) -> Linear:
-        """The same with what its weights predict."""
-        shift = _shift(linear.design, linear.distortion, self.effects, self.reduced.context)
-        explained = linear.design.predict(linear.weights)
-        predicted = tuple(p - s for p, s in zip(explained, shift, strict=True))
-        waves = {n: w for n, w in linear.weights.items() if n == WAVE}
-        waving = tuple(w + np.zeros(a.size) for w, a in zip(linear.design.predict(waves), linear.angles, strict=True))
-        return replace(linear, predicted=predicted, waving=waving)
+        return Linear(*shared, log_scale, solution, jitter, predicted, waving)
 
     def _whitened(self, design, angles, covariances):
         return whiten(design.records(), angles, covariances, self.reduced.scale_dof, self.reduced.settled)
@@ -211,7 +199,7 @@ class Search:
         for effect in (e for e in self.effects if e.name in traces):
             free = self._acts(effect) and effect.name not in idle
             level = effect.present(self.reduced.context) if free else traces[effect.name]
-            priors[effect.name] = (float(np.log(level)), WIDE if free and not effect.of_class else 0.0)
+            priors[effect.name] = (float(np.log(level)), WIDE if free and not (effect.of_class or effect.known) else 0.0)
         priors |= {g.name: (float(np.log(6e-3)), WIDE) for g in self.fixed if g.name not in priors}
         scales = design.scales(priors)
         start = np.array([known.get(name, mean) for name, mean in zip(design.names, scales.mean, strict=True)])
@@ -248,11 +236,15 @@ class Search:
 
 
 def _shift(design, distortion, effects, context):
-    """What the tangent effects' columns make of the distortion itself, less what the others usually are."""
+    """What the tangent effects' columns make of the distortion itself, less the bench's usual friction."""
     found = [0.0] * len(design.groups[0].columns)
-    for effect in (e for e in effects if e.name in design.names and (e.always or isinstance(e, TangentEffect))):
-        size = getattr(distortion, effect.parameter) if isinstance(effect, TangentEffect) else -effect.usual(context)
-        found = [f + c[:, 0] * size for f, c in zip(found, design.group(effect.name).columns, strict=True)]
+    for effect in effects:
+        if isinstance(effect, TangentEffect) and effect.name in design.names:
+            group = design.group(effect.name)
+            found = [f + c[:, 0] * getattr(distortion, effect.parameter) for f, c in zip(found, group.columns, strict=True)]
+        if effect is BENCH_HYSTERESIS:
+            group = design.group(effect.name)
+            found = [f - c[:, 0] * BENCH_HYSTERESIS.usual(context) for f, c in zip(found, group.columns, strict=True)]
     return found
 
 

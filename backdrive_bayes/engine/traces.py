@@ -67,5 +67,6 @@ def sample_noise(reduced: Reduced, design: Design) -> list[np.ndarray]:
 
 
 def usual_level(effect: Effect, context: Context, trace: float) -> float:
-    """Usual standard deviation of an effect's weights where it acts: its own, or ABOVE times its trace if that is more."""
-    return max(effect.present(context), ABOVE * trace)
+    """Usual standard deviation of an effect's weights where it acts: its own, or ABOVE times its trace if that is more and it is
+    not known."""
+    return effect.present(context) if effect.known else max(effect.present(context), ABOVE * trace)

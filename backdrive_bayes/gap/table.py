@@ -79,9 +79,9 @@ class Table:
         usual |= {UNEXPLAINED: UNKNOWN.present(context), "module_change": MODULE_CHANGE}
         usual |= {"uneven": AMPLITUDE, "ratchet": AMPLITUDE, "shape": AMPLITUDE}
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
+        self.known = np.array([n in effects and effects[n].known for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
-        self.terms = {n: tuple(e.name for e in terms if not e.always) for n, terms in all_effects().items()}
-        self.terms[UNEXPLAINED] = (UNEXPLAINED,)
+        self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
         one_way = [n for n, e in effects.items() if isinstance(e, TangentEffect) and e.one_way and n in self.names]
         self.one_way = {n: np.flatnonzero(self.index == self.names.index(n)).tolist() for n in one_way}
         self.jumps = jumps
@@ -110,8 +110,9 @@ class Table:
         return self._integrated[level]
 
     def scale(self, on, size: float = 1.0) -> np.ndarray:
-        """Standard deviations of all other weights where the terms ``on`` are present at ``size`` times their usual level."""
-        level = np.where(np.isin(self.names, list(on)), size * self.present, self.trace)
+        """Standard deviations of all other weights where the terms ``on`` are present at ``size`` times their usual level, or the
+        known one."""
+        level = np.where(np.isin(self.names, list(on)), np.where(self.known, 1.0, size) * self.present, self.trace)
         return level[self.index]
 
     def weigh(self, hypothesis, lift: float) -> Row:

@@ -51,13 +51,14 @@ class Effect:
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
     channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it, ``always``
-    whether its prior is the same whatever acts, with ``usual`` for its mean.
+    whether every bench has it, ``known`` whether its standard deviation where it acts is not inferred.
     ``present`` gives the standard deviation of its (independent) weights where it acts; where it is a mere trace, as on every
     bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
 
     of_class: ClassVar[bool] = False
     always: ClassVar[bool] = False
+    known: ClassVar[bool] = False
     name: str
     breaks: str
     signature: str
@@ -69,10 +70,6 @@ class Effect:
     def present(self, context: Context) -> float:
         """Typical standard deviation of the weights where the effect acts."""
         raise NotImplementedError
-
-    def usual(self, context: Context) -> float:
-        """Mean of the weights' prior, from which they are counted."""
-        return 0.0
 
 
 @dataclass(frozen=True)

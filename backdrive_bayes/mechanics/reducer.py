@@ -57,17 +57,18 @@ class ReducerClass:
         """
         return {p.name: p.mix(_cells(p, growth).means(history)) for p in self.parts}
 
-    def grown(self, history: History, weights, growth, part: int, terms, ends: bool = False) -> list[np.ndarray]:
+    def grown(self, history: History, weights, growth, part: int, terms, ends: bool = False, here=None) -> list[np.ndarray]:
         """Derivatives of the block means (blocks,) with independent ``weights``, or at the segments' ends, by the growth of
-        friction (0) or of drag (1) in the direction of each of ``terms``, one for all or (2, segments)."""
+        friction (0) or of drag (1) in the direction of each of ``terms``, one for all or (2, segments). What the parts that grow
+        make as they are may be known, ``here``."""
         own = [(p.cells, p.weights(weights[p.name])) for p in self.parts if p.name in GROWING[part]]
 
         def response(term):
             moved = (_response(cells.grown(growth[part] + GROWTH_STEP * term), history, w, ends) for cells, w in own)
             return sum(moved, np.zeros(()))
 
-        here, *there = (response(term) for term in (0.0, *terms))
-        return [(moved - here) / GROWTH_STEP for moved in there]
+        here = response(0.0) if here is None else here
+        return [(response(term) - here) / GROWTH_STEP for term in terms]
 
     def ends(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
         """The same at the end of every segment."""

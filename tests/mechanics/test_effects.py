@@ -22,7 +22,6 @@ from backdrive_bayes.mechanics.effect import (
 )
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import SIZE as BENCH_FRICTION
-from backdrive_bayes.mechanics.effects.sensor_lag import LAG_SPREAD
 from backdrive_bayes.mechanics.effects.viscoelastic_creep import BEFORE
 from backdrive_bayes.mechanics.history import behind, through
 from backdrive_bayes.mechanics.part import TOP
@@ -256,29 +255,25 @@ def test_a_lag_knows_of_a_jump_within_a_segment():
 
 
 def test_the_lag_is_the_derivative_of_what_is_delayed_and_what_is_smoothed():
-    """Against a difference quotient of the prediction of which a share is behind a first-order lag and the rest delayed; the
-    delay alone, as if nothing were smoothed, would miss it."""
+    """Against a difference quotient of the prediction of which as much is behind a first-order lag and the rest delayed: the
+    delay alone, as if nothing were smoothed, would miss it, and so would a share that stays."""
     reduced, share, lag, step = unit(), 0.8, 0.05, 1e-3
 
-    def predicted(at):
+    def predicted(at, smooth):
         smoothed = tangents(reduced, at, weights(), "lag_spread")["lag_spread"]
         delayed = class_groups(reduced, REDUCER, at).predict(weights())
-        return [d + share * s[:, 0] for d, s in zip(delayed, smoothed, strict=True)]
+        return [d + smooth * s[:, 0] for d, s in zip(delayed, smoothed, strict=True)]
 
-    below, above = (predicted(Distortion(lag_s=lag + sign * step)) for sign in (-1.0, 1.0))
-    known, delay = (weights() | {"lag_spread": np.array([s - LAG_SPREAD.usual(CONTEXT)])} for s in (share, 0.0))
-    both, alone = (tangents(reduced, Distortion(lag_s=lag), of, "sensor_lag")["sensor_lag"] for of in (known, delay))
+    at = [Distortion(lag_s=lag + sign * step) for sign in (-1.0, 1.0)]
+    below, above = (predicted(d, share * lag / d.lag_s) for d in at)
+    stays = [predicted(d, share) for d in at]
+    known = weights() | {"lag_spread": np.array([share])}
+    both, alone = (tangents(reduced, Distortion(lag_s=lag), of, "sensor_lag")["sensor_lag"] for of in (known, weights()))
     for r, (low, high) in enumerate(zip(below, above, strict=True)):
-        quotient = (high - low) / (2.0 * step)
-        off, without = (np.sqrt(np.mean((columns[r][:, 0] - quotient)[30:] ** 2)) for columns in (both, alone))
-        assert off < 0.15 * np.abs(quotient[30:]).max() and off < 0.5 * without
-
-
-def test_any_share_of_a_lag_may_smooth():
-    """Mean and standard deviation are those of shares from none to all, each as likely; the same whatever acts."""
-    share = np.random.default_rng(0).uniform(size=200_000)
-    assert LAG_SPREAD.usual(CONTEXT) == pytest.approx(share.mean(), abs=3e-3) and LAG_SPREAD.always
-    assert LAG_SPREAD.present(CONTEXT) == pytest.approx(share.std(), abs=3e-3)
+        quotient, other = (high - low) / (2.0 * step), (stays[1][r] - stays[0][r]) / (2.0 * step)
+        apart = both[r][:, 0] - quotient, alone[r][:, 0] - quotient, other - quotient
+        off, without, wrong = (np.sqrt(np.mean(d[30:] ** 2)) for d in apart)
+        assert off < 0.15 * np.abs(quotient[30:]).max() and off < 0.5 * without and off < 0.5 * wrong
 
 
 def test_what_is_smoothed_is_what_a_filter_makes_of_the_prediction():

@@ -26,17 +26,13 @@ SENSOR_LAG = SensorLag(
 
 
 class LagSpread(SpreadEffect):
-    """How much of the lag is a first-order one: 0 for a pure delay, 1 where all of it smooths, all between as likely."""
+    """How much of the lag is a first-order one: 0 for a pure delay, 1 where all of it smooths."""
 
-    always = True
-
-    def usual(self, context):
-        """Mean of the prior."""
-        return 0.5
+    known = True
 
     def present(self, context):
-        """Standard deviation of the prior."""
-        return 1.0 / 12.0**0.5
+        """Root mean square of shares from none to all, each as likely."""
+        return 3.0**-0.5
 
 
 LAG_SPREAD = LagSpread(
