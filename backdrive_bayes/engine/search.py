@@ -34,7 +34,8 @@ LEARNINGS = 4
 STEPS = 40
 """More than a search takes: what ends it is that nothing is promised."""
 STILL = 0.3
-"""Rise of the log density, as a straight line promises it, below which the search ends: knots make it as rough as that."""
+"""Rise of the log density, as a straight line promises it, below which the search ends: ten times as much tells
+of an effect."""
 SPREAD, EXPONENTS = 2e-3, 50.0
 """Standard deviation of the prior that damps a step at first, in shares of the torque, and how many times that in exponents."""
 BROKEN_PROMISE, KEPT_PROMISE, NARROWER, WIDER = 0.25, 0.75, 0.25, 2.0

@@ -76,8 +76,8 @@ def test_starts_hold_the_offset_to_the_torque_noise_and_the_mode_more_closely(of
 
 def test_a_lag_that_smooths_is_found():
     """All of a first-order lag of 60 ms, 6 % of the torque at the fastest rate, is smoothed; where the derivative is that of a
-    delay the search ends at 47 ms. The share is known to be like one from none to all: of a scale that is inferred (planted fault)
-    it goes far beyond. Without a lag there is a trace of it."""
+    delay the search ends at 47 ms. The share is known to be like one from none to all: of a scale that is inferred (planted
+    fault) it goes far beyond. Without a lag there is a trace of it."""
     reduced = reduce_unit(planted(smooth_s=0.06, loops=MORE))
     alone = search.Search(reduced, library_terms(), BASELINE, only=("sensor_lag",))
     found = alone.learn(Distortion(lag_s=0.05))
