@@ -154,7 +154,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
             share = float(known[effect.name][0]) if effect.name in known else 0.0
-            # A longer lag smooths more, less what makes the share smaller: as much of it is first-order, and none without a lag.
+            # As much of a longer lag is first-order, a smaller share of it: without a lag nothing is left.
             longer = [more - at / max(distortion.lag_s, STEP) for more, at in zip(growth, smoothed, strict=True)]
             groups[-1] = _columns(groups[-1].name, [by + share * more for by, more in zip(late, longer, strict=True)])
             groups.append(_columns(effect.name, smoothed))
@@ -169,15 +169,12 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
             late = by if effect.parameter == "lag_s" else late
             groups.append(_columns(effect.name, by))
     for part in (0, 1):
-        own = [e for e in growths if e.part == part]
-        here = design.predict(weights, {n for n in GROWING[part] if n in weights}) if own else base
-        groups += _growth_groups(reduced, reducer, grown, weights, own, here)
+        groups += _growth_groups(reduced, reducer, design, grown, weights, [e for e in growths if e.part == part])
     return tuple(groups)
 
 
-def _growth_groups(reduced, reducer, grown, weights, effects, here) -> list[Group]:
-    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion;
-    ``here`` is what the part makes as it is."""
+def _growth_groups(reduced, reducer, design, grown, weights, effects) -> list[Group]:
+    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion."""
 
     def laws(along):
         rates = zip(reduced.context.log_rate, along, strict=True)
@@ -185,10 +182,13 @@ def _growth_groups(reduced, reducer, grown, weights, effects, here) -> list[Grou
 
     read = laws(histories(reduced, UNDISTORTED))
     identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in read])) > LEAST_RANGE]
+    if not identified:
+        return []
+    part = identified[0].part
+    along = zip(grown, laws([history for history, _ in grown]), design.predict(weights, GROWING[part]), strict=True)
     columns = [
-        reducer.grown(history, weights, growth, identified[0].part, [law[e.term] for e in identified], here=own)
-        for (history, growth), law, own in zip(grown, laws([history for history, _ in grown]), here, strict=True)
-        if identified
+        reducer.grown(history, weights, growth, part, [law[e.term] for e in identified], here=here)
+        for (history, growth), law, here in along
     ]
     return [_columns(e.name, of) for e, of in zip(identified, zip(*columns, strict=True), strict=True)]
 

@@ -211,8 +211,8 @@ class Search:
         """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these."""
         if effect.of_class:
             return True
-        if effect.always or self.only is None:
-            return not effect.always
+        if effect is BENCH_HYSTERESIS or self.only is None:
+            return effect is not BENCH_HYSTERESIS
         # A creep may stand for a law of the rate: where that acts, it is weighed without.
         still = {*BENDING, CREEP} if LAW in self.only else {*BENDING}
         return effect in {t for n, terms in all_effects().items() if n in self.only or n not in still for t in terms}

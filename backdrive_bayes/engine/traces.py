@@ -15,6 +15,7 @@ from backdrive_bayes.engine.design import Design
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import Context, Effect
+from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 
 OFFSET = "torque_offset"
 """Its columns are the slope of the loop."""
@@ -35,7 +36,7 @@ def trace_levels(reduced: Reduced, design: Design, effects: Iterable[Effect]) ->
             columns = columns - np.average(columns, axis=0, weights=own**-2.0)
             square += float(np.sum((columns / own[:, None]) ** 2))
             count += int(settled.sum())
-        found[effect.name] = present if effect.always else TRACE / max(np.sqrt(square / count), TRACE / present)
+        found[effect.name] = present if effect is BENCH_HYSTERESIS else TRACE / max(np.sqrt(square / count), TRACE / present)
     return found
 
 

@@ -50,14 +50,13 @@ class Effect:
     """A candidate effect.
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
-    channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it, ``always``
-    whether every bench has it, ``known`` whether its standard deviation where it acts is not inferred.
+    channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it, ``known``
+    whether its standard deviation where it acts is not inferred.
     ``present`` gives the standard deviation of its (independent) weights where it acts; where it is a mere trace, as on every
     bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
 
     of_class: ClassVar[bool] = False
-    always: ClassVar[bool] = False
     known: ClassVar[bool] = False
     name: str
     breaks: str

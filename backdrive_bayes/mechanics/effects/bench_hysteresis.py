@@ -14,8 +14,6 @@ class BenchHysteresis(Effect):
     It looks like friction of the reducer, so that no record tells it: it widens the intervals of what the loop encloses.
     """
 
-    always = True
-
     def usual(self, context) -> float:
         """Mean of the prior."""
         return float(SIZE * np.sqrt(2.0 / np.pi)) * context.torque_noise
