@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -59,11 +59,11 @@ def joint_mode(free: Search, starts: Sequence[Distortion]) -> tuple[Linear, tupl
 
 
 def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -> tuple[Linear, ...]:
-    """The joint model's mode and modes of what bends the prediction.
+    """The joint model's mode and modes of what bends the prediction, all in one class.
 
     Whatever cannot be followed by a straight line from there (an offset, a lag, a law of the rate, a wave) has modes of its own:
-    one where none of them acts, and those of each and of each pair without the others; all may have the class and noise of the
-    likeliest. A hypothesis is weighed about the mode where it is likeliest.
+    one where none of them acts, and those of each and of each pair without the others. A hypothesis is weighed about the mode
+    where it is likeliest.
     """
     free, starts = Search(reduced, effects, modules), possible_starts(reduced)
     joint, waves, frequency = joint_mode(free, starts)
@@ -79,40 +79,39 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         fixed = (*free.fixed, *(waves if some is None or WAVE in some else ()))
         return replace(free, reduced=like.reduced, fixed=fixed, only=some)
 
-    def mode(some: tuple[str, ...], *near: Distortion) -> Linear:
-        own = search(some, joint)
-        ends = [own.find_mode(joint, at) for at in dict.fromkeys((_only(reach if LAW in some else lawless, some), *near))]
-        # A class that is learnt beside what bends may want it.
-        return max(ends if some else [*ends, own.learn(*near)], key=lambda linear: linear.log_marginal)
+    def mode(some: tuple[str, ...], like: Linear, *near: Distortion) -> Linear:
+        begun = _only(reach if LAW in some else lawless, some)
+        return _likeliest(search(some, like).find_mode(like, at) for at in dict.fromkeys((begun, *near)))
 
     def possible(linear: Linear) -> bool:
         return WAVE not in linear.design.names or rises(linear, frequency)
 
-    apart: dict[tuple[str, ...], Linear] = {}
     if LAW not in bent and any(term.name in joint.design.names for term in all_effects()[LAW]):
         # A creep may stand for all of it.
-        apart[(LAW,)] = mode((LAW,))
-        bent = (*bent, LAW) if _bends(LAW, apart[(LAW,)].distortion, context) else bent
+        bent = (*bent, LAW) if _bends(LAW, mode((LAW,), joint).distortion, context) else bent
+    modes: dict[tuple[str, ...] | None, Linear] = {None: joint}
     if bent:
-        apart[()] = mode((), Distortion())
-        apart |= {(name,): apart.get((name,)) or mode((name,), apart[()].distortion) for name in bent}
-        bent = tuple(name for name in bent if possible(apart[(name,)]))
+        joint, none = _in_one_class(joint, search((), joint).learn(Distortion()), search)
+        none = _likeliest((none, mode((), joint)))
+        apart = {(name,): mode((name,), joint, none.distortion) for name in bent}
+        apart = {some: linear for some, linear in apart.items() if possible(linear)}
         # Of two that act together each alone is likelier than nothing; beside a law of the rate no creep acted.
-        least = apart[()].log_marginal
-        likelier = [name for name in bent if name == LAW or apart[(name,)].log_marginal > least]
-        apart |= {pair: mode(pair) for pair in itertools.combinations(likelier, 2)}
-
-    modes = {None: joint} | {some: end for some, end in apart.items() if set(some) <= set(bent) and possible(end)}
-    modes = _in_one_class(modes, max(modes.values(), key=lambda linear: linear.log_marginal), search)
-    modes = _reached(modes | {(): _with_none(modes, search)} if () in modes else modes)
+        likelier = [some[0] for some, linear in apart.items() if LAW in some or linear.log_marginal > none.log_marginal]
+        apart |= {pair: mode(pair, joint) for pair in itertools.combinations(likelier, 2)}
+        modes = {None: joint, (): none} | {some: linear for some, linear in apart.items() if possible(linear)}
+        modes = _reached(modes | {(): _with_none(modes, search)})
     # At the joint mode a drift may stand for a wander.
-    straight = modes.get((), modes[None])
+    straight = modes.get((), joint)
     wandering, gain = learn_wander(_calm(straight))
     if gain > 0 and wandering.noise != straight.reduced.noise:
-        still = replace(search((), straight), reduced=wandering)
-        steady = still.find_mode(straight, _only(straight.distortion, ()))
-        modes = _in_one_class(modes | {(): steady}, steady, search)
+        steady = replace(search((), straight), reduced=wandering).find_mode(straight, _only(straight.distortion, ()))
+        found = ((some, linear, search(some, steady).find_mode(steady, linear.distortion)) for some, linear in modes.items())
+        modes = {some: _likeliest(ends) for some, *ends in found} | {(): steady}
     return tuple(linear.without(WAVE) for linear in modes.values())
+
+
+def _likeliest(modes: Iterable[Linear]) -> Linear:
+    return max(modes, key=lambda linear: linear.log_marginal)
 
 
 def _reached(modes: dict) -> dict:
@@ -125,28 +124,24 @@ def _reached(modes: dict) -> dict:
     return {some: linear for some, linear in modes.items() if some is None or not spare(some, linear)}
 
 
-def _in_one_class(modes, like: Linear, search) -> dict:
-    """Modes by what may act, each in the class and noise of one of them where it is likelier there: what acts is not weighed by
-    the class that its own search came upon. ``search`` is that of what may act, in the noise of a mode."""
-    found = {}
-    for some, linear in modes.items():
-        same = linear.reducer is like.reducer and linear.reduced is like.reduced
-        there = linear if same else search(some, like).find_mode(like, linear.distortion)
-        found[some] = max(linear, there, key=lambda mode: mode.log_marginal)
-    return found
+def _in_one_class(joint: Linear, none: Linear, search) -> tuple[Linear, Linear]:
+    """The joint mode and that of none in one class that has what either was learnt to want: one that is learnt beside what bends
+    wants less than one that has to do without, and what acts is not to be weighed by the class that its own search came upon.
+    """
+    pair = ((None, joint), ((), none))
+    some, best = max(pair, key=lambda item: item[1].log_marginal)
+    like = search(some, best).widened(best, (none if best is joint else joint).reducer)
+    joint, none = (search(some, like).find_mode(like, linear.distortion) for some, linear in pair)
+    return joint, none
 
 
 def _with_none(modes, search) -> Linear:
-    """The likeliest mode where none acts that is found from there or from the others, each in its class: a law of the amplitude
-    or a class that the search of an effect came upon is not to speak for the effect."""
-    ends, begun = [modes[()]], [modes[()]]
-    for linear in modes.values():
-        start = _only(linear.distortion, ())
-        alike = (known.distortion for known in begun if known.reducer is linear.reducer and known.reduced is linear.reduced)
-        if all(_differ(start, known, linear.reduced.context) for known in alike):
-            begun.append(replace(linear, distortion=start))
-            ends.append(search((), linear).find_mode(linear, start))
-    return max(ends, key=lambda linear: linear.log_marginal)
+    """The likeliest mode where none acts that is found from there or from the others: a law of the amplitude that the search of
+    an effect came upon is not to speak for the effect."""
+    known = modes[()]
+    starts = [known.distortion, *(_only(linear.distortion, ()) for linear in modes.values())]
+    others = _apart(starts, known.reduced.context)[1:]
+    return _likeliest((known, *(search((), known).find_mode(known, start) for start in others)))
 
 
 def _calm(linear: Linear) -> Linear:

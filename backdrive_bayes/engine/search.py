@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backdrive_bayes.engine.design import Group, class_groups, class_priors, histories, path_group, tangent_groups
-from backdrive_bayes.engine.flanks import select_flank
+from backdrive_bayes.engine.flanks import RATIOS, select_flank
 from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import SWEEPS, find_scales, whiten
@@ -90,6 +90,14 @@ class Search:
         fine = self._refined(linear, learning=False)
         ends = [self._refined(one) for one in ((linear, fine) if fine is not linear else (linear,))]
         return max(ends, key=lambda end: end.log_marginal)
+
+    def widened(self, linear: Linear, other: ReducerClass) -> Linear:
+        """The same about the same distortion in a class, and with a jitter, that is learnt from one that has the knots of another
+        class where they are denser there, and its flanks."""
+        gaps = np.diff(other.knots, prepend=-np.inf, append=np.inf)
+        knots = _with_others(linear.reducer.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1]))
+        ratios = _with_others(linear.reducer.ratios, other.ratios, np.full(other.ratios.size, np.diff(RATIOS).max()))
+        return self._refined(self._anew(linear, reducer=replace(linear.reducer, knots=knots, ratios=ratios)))
 
     def _refined(self, linear: Linear, learning: bool = True) -> Linear:
         """The likeliest on the way to one with the knots that the residuals want, and the jitter where it is ``learning``."""
@@ -258,6 +266,12 @@ def length(moved, distortion, context) -> float:
     """Largest part of the step between two distortions, in shares of the torque scale."""
     units = _units(distortion, context)
     return max(abs(getattr(moved, n) - getattr(distortion, n)) / unit for n, unit in units.items())
+
+
+def _with_others(own, others, least) -> np.ndarray:
+    """Rising values (n,), and those of ``others`` (k,) that are further than ``least`` (k,) from each of them."""
+    apart = np.abs(others[:, None] - np.r_[own, np.inf]).min(axis=1)
+    return np.sort(np.r_[own, others[apart > least]])
 
 
 def _finer(linear) -> ReducerClass:

@@ -371,28 +371,49 @@ def test_a_damped_step_is_the_mode_beside_one_more_prior(searching):
     assert all(far(spread, 50.0) < 1e-4 for spread in (1e-5, 1e-4, 1e-2)) and far(1e-5, 10.0) > 0.1
 
 
-def test_modes_are_compared_in_the_class_of_the_likeliest(searching):
+def by_what_acts(free):
+    """Searches by what may act, in the noise of a mode."""
+    return lambda some, like: replace(free, reduced=like.reduced, only=some)
+
+
+def test_modes_are_compared_in_one_class(searching):
     """A mode in a class of few knots (planted fault) is lower by its class, not by what acts."""
     free, like = searching
     few = replace(like.reducer, knots=like.reducer.knots[[0, -30, -1]])
-    poor = replace(free, only=("torque_offset",)).find_mode(free._anew(like, reducer=few), like.distortion)
-    assert poor.log_marginal < like.log_marginal - 20.0
-    modes = {None: like, ("torque_offset",): poor}
-    found = engine._in_one_class(modes, like, lambda some, mode: replace(free, reduced=mode.reduced, only=some))
-    assert found[None] is like and found[("torque_offset",)].reducer is like.reducer
-    assert found[("torque_offset",)].log_marginal > like.log_marginal - 5.0
+    poor = free.find_mode(free._anew(like, reducer=few), like.distortion)
+    none = replace(free, only=()).find_mode(like, Distortion())
+    assert poor.log_marginal < min(like.log_marginal, none.log_marginal) - 20.0
+    joint, still = engine._in_one_class(poor, none, by_what_acts(free))
+    assert joint.reducer is still.reducer and joint.covariances is still.covariances
+    assert joint.log_marginal > like.log_marginal - 5.0 and still.log_marginal < joint.log_marginal - 20.0
 
 
-def test_a_class_that_another_search_came_upon_speaks_for_no_effect(searching):
-    """None ended in a class of few knots (planted fault), a lag that is nothing in the right one: the lag is worth nothing."""
+def test_a_class_takes_of_another_what_is_denser_there():
+    """Knots as dense as its own, wherever they lie, are not taken (planted fault: all that differ are), nor the same flank twice."""
+    own = np.linspace(0.0, 1.4, 29)
+    dense = np.linspace(0.4, 0.5, 21)
+    other = np.r_[0.0, own[1:7] + 0.02, dense, 0.6, 1.4]
+    free = search.Search(reduce_unit(planted()), library_terms(), BASELINE)
+    linear = free.first(Distortion())
+    linear = free._anew(linear, reducer=replace(linear.reducer, knots=own, ratios=np.array([0.3])))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search.Search, "_refined", lambda self, one: one)
+        wide = free.widened(linear, replace(linear.reducer, knots=other, ratios=np.array([0.32, 0.6]))).reducer
+    taken = np.setdiff1d(wide.knots, own)
+    assert np.isin(own, wide.knots).all() and np.isin(taken, dense).all() and taken.size > 12
+    assert np.setdiff1d(other, own).size > taken.size + 5
+    assert wide.ratios.tolist() == [0.3, 0.6]
+
+
+def test_a_law_that_another_search_came_upon_speaks_for_no_effect(searching):
+    """None ended far off along the law of the amplitude (planted fault), a lag that is nothing on the right one."""
     free, like = searching
     offset = replace(free, only=("torque_offset",)).find_mode(like, like.distortion)
-    few = replace(like.reducer, knots=like.reducer.knots[[0, -30, -1]])
-    none = replace(free, only=()).find_mode(free._anew(like, reducer=few), Distortion())
+    still = replace(free, only=())
+    lost = still._linear(like.reducer, Distortion(friction_amplitude=3.0), like.covariances, {}, like.jitter, set())
     late = replace(free, only=("sensor_lag",)).find_mode(like, Distortion())
-    modes = {(): none, ("sensor_lag",): late, ("torque_offset",): offset}
-    found = engine._with_none(modes, lambda some, mode: replace(free, reduced=mode.reduced, only=some))
-    assert none.log_marginal < late.log_marginal - 20.0
+    found = engine._with_none({(): lost, ("sensor_lag",): late, ("torque_offset",): offset}, by_what_acts(free))
+    assert lost.log_marginal < late.log_marginal - 20.0
     assert abs(found.log_marginal - late.log_marginal) < 5.0
     assert found.log_marginal < offset.log_marginal - 20.0
 
