@@ -105,8 +105,9 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     wandering, gain = learn_wander(_calm(straight))
     if gain > 0 and wandering.noise != straight.reduced.noise:
         steady = replace(search((), straight), reduced=wandering).find_mode(straight, _only(straight.distortion, ()))
-        found = ((some, linear, search(some, steady).find_mode(steady, linear.distortion)) for some, linear in modes.items())
-        modes = {some: _likeliest(ends) for some, *ends in found} | {(): steady}
+        others = ((some, linear) for some, linear in modes.items() if some != ())
+        found = {some: (linear, search(some, steady).find_mode(steady, linear.distortion)) for some, linear in others}
+        modes = modes | {some: _likeliest(ends) for some, ends in found.items()} | {(): steady}
     return tuple(linear.without(WAVE) for linear in modes.values())
 
 
@@ -125,14 +126,16 @@ def _reached(modes: dict) -> dict:
 
 
 def _in_one_class(joint: Linear, none: Linear, search) -> tuple[Linear, Linear]:
-    """The joint mode and that of none in one class that has what either was learnt to want: one that is learnt beside what bends
-    wants less than one that has to do without, and what acts is not to be weighed by the class that its own search came upon.
-    """
+    """The joint mode and that of none in one class: that of the likelier of them, or one that has the other's as well if that is
+    likelier. What acts is not to be weighed by the class that its own search came upon. The less likely mode may have a jitter of
+    its own: what does not act may be scatter of the crossing torques instead."""
     pair = ((None, joint), ((), none))
-    some, best = max(pair, key=lambda item: item[1].log_marginal)
-    like = search(some, best).widened(best, (none if best is joint else joint).reducer)
-    joint, none = (search(some, like).find_mode(like, linear.distortion) for some, linear in pair)
-    return joint, none
+    (some, best), (rest, other) = sorted(pair, key=lambda item: -item[1].log_marginal)
+    wide = search(some, best).widened(best, other.reducer)
+    best = _likeliest((best, search(some, wide).find_mode(wide, best.distortion)))
+    less = search(rest, best).find_mode(best, other.distortion)
+    found = {some: best, rest: _likeliest((less, search(rest, best).with_own_jitter(less)))}
+    return found[None], found[()]
 
 
 def _with_none(modes, search) -> Linear:
@@ -181,12 +184,8 @@ def _only(distortion: Distortion, some) -> Distortion:
 
 def _apart(starts, context):
     """Starts that differ by more than the distance of knots."""
-    kept = []
+    kept, least = [], 2 * LEAST_APART * context.torque_noise
     for start in starts:
-        if all(_differ(start, other, context) for other in kept):
+        if all(length(start, other, context) > least for other in kept):
             kept.append(start)
     return kept
-
-
-def _differ(start, other, context) -> bool:
-    return length(start, other, context) > 2 * LEAST_APART * context.torque_noise

@@ -92,19 +92,29 @@ class Search:
         return max(ends, key=lambda end: end.log_marginal)
 
     def widened(self, linear: Linear, other: ReducerClass) -> Linear:
-        """The same about the same distortion in a class, and with a jitter, that is learnt from one that has the knots of another
-        class where they are denser there, and its flanks."""
+        """The model about the same distortion in a class that has the knots of both, of the other only where they are denser,
+        and the flanks of both; knots and jitter are then refined."""
         gaps = np.diff(other.knots, prepend=-np.inf, append=np.inf)
-        knots = _with_others(linear.reducer.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1]))
+        knots = spaced(_with_others(linear.reducer.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1])), self._least)
         ratios = _with_others(linear.reducer.ratios, other.ratios, np.full(other.ratios.size, np.diff(RATIOS).max()))
         return self._refined(self._anew(linear, reducer=replace(linear.reducer, knots=knots, ratios=ratios)))
+
+    def with_own_jitter(self, linear: Linear) -> Linear:
+        """The mode that is reached from one with the jitter that is learnt there."""
+        own = self._anew(linear, jitter=learn_jitter(linear))
+        return self.find_mode(own, own.distortion)
+
+    @property
+    def _least(self) -> float:
+        """Least distance of knots in a refined class, in shares of the torque scale."""
+        return 0.8 * LEAST_APART * self.reduced.context.torque_noise
 
     def _refined(self, linear: Linear, learning: bool = True) -> Linear:
         """The likeliest on the way to one with the knots that the residuals want, and the jitter where it is ``learning``."""
         best = linear
         for _ in range(LEARNINGS):
             before, linear = linear, self._anew(linear, jitter=learn_jitter(linear)) if learning else linear
-            finer = _finer(linear)
+            finer = _finer(linear, self._least)
             refined = self._anew(linear, reducer=finer) if finer.knots.size > linear.reducer.knots.size else linear
             best = max((best, linear, refined), key=lambda one: one.log_marginal)
             if refined is linear and linear.jitter == before.jitter:
@@ -274,7 +284,7 @@ def _with_others(own, others, least) -> np.ndarray:
     return np.sort(np.r_[own, others[apart > least]])
 
 
-def _finer(linear) -> ReducerClass:
+def _finer(linear, least: float) -> ReducerClass:
     """The class with more knots where settled blocks leave a conspicuous residual, the worst first until there are MOST_KNOTS."""
     reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
     for blocks, white, settled in zip(reduced.blocks, linear.residuals(), reduced.settled, strict=True):
@@ -283,7 +293,6 @@ def _finer(linear) -> ReducerClass:
             about = range(max(i - 1, 0), min(i + 2, white.size))
             wanted.append((abs(white[i]), np.concatenate([np.linspace(low[j], high[j], 5) for j in about])))
     wanted.sort(key=lambda found: -found[0])
-    least = 0.8 * LEAST_APART * reduced.context.torque_noise
     for _, torques in wanted:
         inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
         finer = spaced(np.r_[inner[inner < TOP], TOP], least)

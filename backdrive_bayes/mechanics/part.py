@@ -9,8 +9,7 @@ import numpy as np
 from backdrive_bayes.mechanics.cells import Cells
 
 TOP = 1.4
-"""Torque up to which cells reach, in the unit's largest: with no offset of the torque channel that is looked for (they go to 0.4)
-does the torque leave the class."""
+"""Torque up to which cells reach, in the unit's largest: what the torque channel may be off by is looked for within as much."""
 SHARED = 0.97
 """Share of the variance that neighbouring thresholds of friction, or torques of clearance and free play, have in common."""
 

@@ -388,6 +388,37 @@ def test_modes_are_compared_in_one_class(searching):
     assert joint.log_marginal > like.log_marginal - 5.0 and still.log_marginal < joint.log_marginal - 20.0
 
 
+def test_one_class_has_the_knots_that_either_mode_wants(monkeypatch, searching):
+    """One class has knots at small torques only, one at larger ones only; where nothing is taken of the other (planted fault)
+    both modes are lower."""
+    free, like = searching
+    knots, still = like.reducer.knots, replace(free, only=())
+
+    def mode_with(kept, search, start):
+        reducer = replace(like.reducer, knots=knots[kept | (knots == 0.0) | (knots == knots[-1])])
+        return search.find_mode(search._anew(like, reducer=reducer), start)
+
+    pair = mode_with(knots > 0.05, free, like.distortion), mode_with(knots <= 0.05, still, Distortion())
+    monkeypatch.setattr(search.Search, "_refined", lambda self, linear: linear)
+    joint, none = engine._in_one_class(*pair, by_what_acts(free))
+    assert joint.reducer is none.reducer and joint.reducer.knots.size > pair[0].reducer.knots.size + 10
+    assert np.diff(joint.reducer.knots).min() >= free._least
+    monkeypatch.setattr(search.Search, "widened", lambda self, linear, other: linear)
+    alone = engine._in_one_class(*pair, by_what_acts(free))
+    assert joint.log_marginal > alone[0].log_marginal + 20.0 and none.log_marginal > alone[1].log_marginal + 20.0
+
+
+def test_none_may_have_a_jitter_of_its_own():
+    """Without the lag crossings scatter more than beside it; held to the noise of the joint mode (planted fault) none is lower."""
+    free = search.Search(reduce_unit(planted(lag_s=0.03)), library_terms(), BASELINE)
+    still = replace(free, only=())
+    pair = free.learn(Distortion(lag_s=0.03)), still.learn(Distortion())
+    joint, none = engine._in_one_class(*pair, by_what_acts(free))
+    held = still.find_mode(joint, none.distortion)
+    assert none.jitter.torque > 2.0 * joint.jitter.torque
+    assert joint.log_marginal - 20.0 > none.log_marginal > held.log_marginal + 20.0
+
+
 def test_a_class_takes_of_another_what_is_denser_there():
     """Knots as dense as its own, wherever they lie, are not taken (planted fault: all that differ are), nor the same flank twice."""
     own = np.linspace(0.0, 1.4, 29)
