@@ -93,7 +93,7 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     if bent:
         joint, none = _in_one_class(joint, search((), joint).learn(Distortion()), search)
         none = _likeliest((none, mode((), joint)))
-        apart = {(name,): mode((name,), joint, none.distortion) for name in bent}
+        apart: dict[tuple[str, ...], Linear] = {(name,): mode((name,), joint, none.distortion) for name in bent}
         apart = {some: linear for some, linear in apart.items() if possible(linear)}
         # Of two that act together each alone is likelier than nothing; beside a law of the rate no creep acted.
         likelier = [some[0] for some, linear in apart.items() if LAW in some or linear.log_marginal > none.log_marginal]
@@ -127,14 +127,14 @@ def _reached(modes: dict) -> dict:
 
 def _in_one_class(joint: Linear, none: Linear, search) -> tuple[Linear, Linear]:
     """The joint mode and that of none in one class: that of the likelier of them, or one that has the other's as well if that is
-    likelier. What acts is not to be weighed by the class that its own search came upon. The less likely mode may have a jitter of
+    likelier. What acts is not to be weighed by the class that its own search came upon. The less likely mode may have a noise of
     its own: what does not act may be scatter of the crossing torques instead."""
     pair = ((None, joint), ((), none))
     (some, best), (rest, other) = sorted(pair, key=lambda item: -item[1].log_marginal)
     wide = search(some, best).widened(best, other.reducer)
     best = _likeliest((best, search(some, wide).find_mode(wide, best.distortion)))
     less = search(rest, best).find_mode(best, other.distortion)
-    found = {some: best, rest: _likeliest((less, search(rest, best).with_own_jitter(less)))}
+    found = {some: best, rest: _likeliest((less, search(rest, best).with_own_noise(less)))}
     return found[None], found[()]
 
 

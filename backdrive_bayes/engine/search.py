@@ -95,26 +95,21 @@ class Search:
         """The model about the same distortion in a class that has the knots of both, of the other only where they are denser,
         and the flanks of both; knots and jitter are then refined."""
         gaps = np.diff(other.knots, prepend=-np.inf, append=np.inf)
-        knots = spaced(_with_others(linear.reducer.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1])), self._least)
+        both = _with_others(linear.reducer.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1]))
         ratios = _with_others(linear.reducer.ratios, other.ratios, np.full(other.ratios.size, np.diff(RATIOS).max()))
-        return self._refined(self._anew(linear, reducer=replace(linear.reducer, knots=knots, ratios=ratios)))
+        return self._refined(self._anew(linear, reducer=replace(linear.reducer, knots=spaced(both, _least(self.reduced)), ratios=ratios)))
 
-    def with_own_jitter(self, linear: Linear) -> Linear:
-        """The mode that is reached from one with the jitter that is learnt there."""
+    def with_own_noise(self, linear: Linear) -> Linear:
+        """The mode that is reached from one with the jitter that is learnt there, and the noise by what it predicts."""
         own = self._anew(linear, jitter=learn_jitter(linear))
         return self.find_mode(own, own.distortion)
-
-    @property
-    def _least(self) -> float:
-        """Least distance of knots in a refined class, in shares of the torque scale."""
-        return 0.8 * LEAST_APART * self.reduced.context.torque_noise
 
     def _refined(self, linear: Linear, learning: bool = True) -> Linear:
         """The likeliest on the way to one with the knots that the residuals want, and the jitter where it is ``learning``."""
         best = linear
         for _ in range(LEARNINGS):
             before, linear = linear, self._anew(linear, jitter=learn_jitter(linear)) if learning else linear
-            finer = _finer(linear, self._least)
+            finer = _finer(linear)
             refined = self._anew(linear, reducer=finer) if finer.knots.size > linear.reducer.knots.size else linear
             best = max((best, linear, refined), key=lambda one: one.log_marginal)
             if refined is linear and linear.jitter == before.jitter:
@@ -284,7 +279,12 @@ def _with_others(own, others, least) -> np.ndarray:
     return np.sort(np.r_[own, others[apart > least]])
 
 
-def _finer(linear, least: float) -> ReducerClass:
+def _least(reduced: Reduced) -> float:
+    """Least distance of knots in a refined class, in shares of the torque scale."""
+    return 0.8 * LEAST_APART * reduced.context.torque_noise
+
+
+def _finer(linear) -> ReducerClass:
     """The class with more knots where settled blocks leave a conspicuous residual, the worst first until there are MOST_KNOTS."""
     reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
     for blocks, white, settled in zip(reduced.blocks, linear.residuals(), reduced.settled, strict=True):
@@ -295,6 +295,6 @@ def _finer(linear, least: float) -> ReducerClass:
     wanted.sort(key=lambda found: -found[0])
     for _, torques in wanted:
         inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
-        finer = spaced(np.r_[inner[inner < TOP], TOP], least)
+        finer = spaced(np.r_[inner[inner < TOP], TOP], _least(reduced))
         knots = finer if finer.size <= MOST_KNOTS else knots
     return replace(linear.reducer, knots=knots)

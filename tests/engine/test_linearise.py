@@ -384,7 +384,7 @@ def test_modes_are_compared_in_one_class(searching):
     none = replace(free, only=()).find_mode(like, Distortion())
     assert poor.log_marginal < min(like.log_marginal, none.log_marginal) - 20.0
     joint, still = engine._in_one_class(poor, none, by_what_acts(free))
-    assert joint.reducer is still.reducer and joint.covariances is still.covariances
+    assert joint.reducer is still.reducer
     assert joint.log_marginal > like.log_marginal - 5.0 and still.log_marginal < joint.log_marginal - 20.0
 
 
@@ -402,14 +402,14 @@ def test_one_class_has_the_knots_that_either_mode_wants(monkeypatch, searching):
     monkeypatch.setattr(search.Search, "_refined", lambda self, linear: linear)
     joint, none = engine._in_one_class(*pair, by_what_acts(free))
     assert joint.reducer is none.reducer and joint.reducer.knots.size > pair[0].reducer.knots.size + 10
-    assert np.diff(joint.reducer.knots).min() >= free._least
+    assert np.diff(joint.reducer.knots).min() >= search._least(free.reduced)
     monkeypatch.setattr(search.Search, "widened", lambda self, linear, other: linear)
     alone = engine._in_one_class(*pair, by_what_acts(free))
     assert joint.log_marginal > alone[0].log_marginal + 20.0 and none.log_marginal > alone[1].log_marginal + 20.0
 
 
-def test_none_may_have_a_jitter_of_its_own():
-    """Without the lag crossings scatter more than beside it; held to the noise of the joint mode (planted fault) none is lower."""
+def test_none_may_have_a_noise_of_its_own():
+    """Without the lag crossings scatter more than beside it; in the noise of the joint mode (planted fault) none is lower."""
     free = search.Search(reduce_unit(planted(lag_s=0.03)), library_terms(), BASELINE)
     still = replace(free, only=())
     pair = free.learn(Distortion(lag_s=0.03)), still.learn(Distortion())
@@ -420,7 +420,7 @@ def test_none_may_have_a_jitter_of_its_own():
 
 
 def test_a_class_takes_of_another_what_is_denser_there():
-    """Knots as dense as its own, wherever they lie, are not taken (planted fault: all that differ are), nor the same flank twice."""
+    """Of another class only knots closer together than its own are taken (planted fault: all that differ), no flank twice."""
     own = np.linspace(0.0, 1.4, 29)
     dense = np.linspace(0.4, 0.5, 21)
     other = np.r_[0.0, own[1:7] + 0.02, dense, 0.6, 1.4]
@@ -480,6 +480,6 @@ def test_a_search_ends_where_its_own_straight_line_leads_nowhere(options):
 def test_amplitudes_that_are_hardly_two_are_so_at_every_offset(offset_nm, other):
     linears = linearise(reduce_unit(planted(offset_nm=offset_nm, loops=((0.1, 0.02), (other, 0.1)))), library_terms())
     assert len({linear.design.names for linear in linears}) == 1
-    for linear in linears[1:]:
-        for own, joint in zip(linear.covariances, linears[0].covariances, strict=True):
-            np.testing.assert_array_equal(own, joint)
+    assert all(linear.reducer is linears[0].reducer for linear in linears)
+    # None may have a noise of its own.
+    assert len({tuple(c.tobytes() for c in linear.covariances) for linear in linears}) <= 2
