@@ -14,7 +14,7 @@ from backdrive_bayes.engine.marginal import SWEEPS, find_scales, whiten
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.traces import trace_levels
-from backdrive_bayes.mechanics.clearance import place_knots, spaced
+from backdrive_bayes.mechanics.clearance import joined, place_knots, spaced
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.part import TOP
@@ -94,10 +94,11 @@ class Search:
     def widened(self, linear: Linear, other: ReducerClass) -> Linear:
         """The model about the same distortion in a class that has the knots of both, of the other only where they are denser,
         and the flanks of both; knots and jitter are then refined."""
-        gaps = np.diff(other.knots, prepend=-np.inf, append=np.inf)
-        both = _with_others(linear.reducer.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1]))
-        ratios = _with_others(linear.reducer.ratios, other.ratios, np.full(other.ratios.size, np.diff(RATIOS).max()))
-        return self._refined(self._anew(linear, reducer=replace(linear.reducer, knots=spaced(both, _least(self.reduced)), ratios=ratios)))
+        own, gaps = linear.reducer, np.diff(other.knots, prepend=-np.inf, append=np.inf)
+        knots = joined(own.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1]))
+        ratios = joined(own.ratios, other.ratios, np.full(other.ratios.size, np.diff(RATIOS).max()))
+        reducer = replace(own, knots=spaced(knots, _least(self.reduced)), ratios=ratios)
+        return self._refined(self._anew(linear, reducer=reducer))
 
     def with_own_noise(self, linear: Linear) -> Linear:
         """The mode that is reached from one with the jitter that is learnt there, and the noise by what it predicts."""
@@ -271,12 +272,6 @@ def length(moved, distortion, context) -> float:
     """Largest part of the step between two distortions, in shares of the torque scale."""
     units = _units(distortion, context)
     return max(abs(getattr(moved, n) - getattr(distortion, n)) / unit for n, unit in units.items())
-
-
-def _with_others(own, others, least) -> np.ndarray:
-    """Rising values (n,), and those of ``others`` (k,) that are further than ``least`` (k,) from each of them."""
-    apart = np.abs(others[:, None] - np.r_[own, np.inf]).min(axis=1)
-    return np.sort(np.r_[own, others[apart > least]])
 
 
 def _least(reduced: Reduced) -> float:

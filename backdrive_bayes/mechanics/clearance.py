@@ -61,3 +61,9 @@ def spaced(knots, least: float) -> np.ndarray:
         if value - kept[-1] >= least:
             kept.append(float(value))
     return np.array([*kept, float(knots[-1])])
+
+
+def joined(values, others, least) -> np.ndarray:
+    """Rising values (n,) with those of ``others`` (k,) that are further than ``least`` (k,) from each of them."""
+    apart = np.abs(others[:, None] - np.r_[values, np.inf]).min(axis=1)
+    return np.sort(np.r_[values, others[apart > least]])
