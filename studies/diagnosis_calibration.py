@@ -55,7 +55,8 @@ second unit of this project's four benches (`studies/make_bench.py --units 60 --
 `studies/outside_bench.py --units 60 --seed 5`; its successors are `studies/second_outside_bench.py` … with 80 units and seeds
 11, 21, … 101 (the tenth with `--trace 0.33`), each written without sight of the package and run before it was looked at (what
 these first runs gave stands in docs/shown.md). Of the first two every fourth unit is here, of the third 16 of these, of the
-eighth and ninth every second (of odd number), of the tenth all. All rows are of the present code."""
+eighth and ninth every second (of odd number), of the tenth all. All rows are of the code
+before the modes of a unit had one class."""
 FRESH = """`studies/eleventh_outside_bench.py --units 80 --seed 111`, written without sight of the package and run whole before it
 was looked at. With `unlisted` at -2.3, as it was then, exact was 0.69, none 0.83 and the log score -1.02. Vibration that all
 records share is found since, with two of its units in view: that part of the scores below is not fresh."""

@@ -8,12 +8,11 @@ import numpy as np
 
 from backdrive_bayes.bench.draws import first_order
 from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.records.record import Record, Unit
 
-LARGEST = 1.2
-"""Torque up to which the truth has clearances, in shares of the largest; the class that is fitted reaches further."""
-KNOTS = np.r_[0.0, np.geomspace(0.004, LARGEST, 80)]
+KNOTS = np.r_[0.0, np.geomspace(0.004, TOP, 80)]
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.predictive import block_offsets
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.part import TOP
 
 MOST_NODES = 20_000
 """Samples at which the class is evaluated; between them, on one monotone run, curves are straight."""
@@ -16,8 +17,6 @@ PRELOADS = np.array([0.0, 1.0, -1.0, 1 / 3, -1 / 3, 2 / 3, -2 / 3])
 """Torques, in the largest measured one, from which a reducer of unknown history may have come, equally probable."""
 SLACK = 0.02
 """Share by which a torque may pass the largest measured one without being beyond it."""
-FURTHEST = 1.2
-"""Torque, in the largest measured one, up to which an angle is extrapolated where that is asked for."""
 RATE_REACH, LONE_RATE_REACH = 3.0, 1.5
 """Factors by which a loading rate may leave those measured, and a lone one, before a prediction says so."""
 
@@ -57,12 +56,12 @@ def nodes(torque_nm) -> np.ndarray:
 
 
 def require_range(posterior: Posterior, torque_nm, extrapolate: bool, where) -> None:
-    """BadInput for a history that leaves the measured torques, or with ``extrapolate`` those up to FURTHEST."""
+    """BadInput for a history that leaves the measured torques, or with ``extrapolate`` those that the class reaches."""
     largest, highest = float(np.abs(torque_nm).max()), posterior.context.torque_scale_nm
-    reach = (FURTHEST if extrapolate else 1.0 + SLACK) * highest
+    reach = (TOP if extrapolate else 1.0 + SLACK) * highest
     if not largest <= reach:
-        further = f"{FURTHEST * highest:.4g} N·m, {FURTHEST:g} times the largest measured"
-        near = f"{highest:.4g} N·m, the largest measured (--extrapolate goes to {FURTHEST * highest:.4g})"
+        further = f"{TOP * highest:.4g} N·m, {TOP:g} times the largest measured"
+        near = f"{highest:.4g} N·m, the largest measured (--extrapolate goes to {TOP * highest:.4g})"
         raise BadInput(where, f"torques up to {further if extrapolate else near}", f"{largest:.4g} N·m")
 
 

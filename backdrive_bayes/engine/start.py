@@ -9,11 +9,10 @@ import numpy as np
 
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import Distortion
-from backdrive_bayes.mechanics.part import TOP
 
 LEVELS = np.linspace(-0.9, 0.9, 73)
 TORQUES = np.linspace(-0.97, 0.97, 1941)
-SHIFTS = np.linspace(1.0 - TOP, TOP - 1.0, 401)
+SHIFTS = np.linspace(-0.4, 0.4, 401)
 FINE = np.linspace(-0.002, 0.002, 41)
 """Torques at which legs are compared, and offsets that are tried, roughly and finely, in shares of the torque scale."""
 LONG, HALF = 0.6, 0.4

@@ -34,10 +34,9 @@ FLANK_ALIKE = 0.3
 """Correlation length of a flank's compliance over the root of the load."""
 FLANK_SCALE = (float(np.log(0.01)), 1.5)
 """Normal prior of the log scale of flanks; one scale is learnt for all of them."""
-FLANK_NODES = np.r_[np.linspace(0.0, 1.0, 26) ** 1.5, TOP]
+FLANK_NODES = np.r_[np.linspace(0.0, 1.0, 26)[:-1] ** 1.5, TOP]
 """Torques between which the compliance of a flank is constant. A flank that releases beyond zero torque does so in the order in
-which it slipped, relays of a cell in the opposite one: up to the largest measured torque cells are narrow, most of all at small
-loads."""
+which it slipped, relays of a cell in the opposite one: the cells are narrow, most of all at small loads."""
 FRICTION = ("masing", "friction", "flanks")
 """Parts of friction: the same at every load, as the load wants it, in proportion to it."""
 LARGEST_THRESHOLD = 0.3

@@ -8,8 +8,8 @@ import numpy as np
 
 from backdrive_bayes.mechanics.cells import Cells
 
-TOP = 1.4
-"""Torque up to which cells reach, in the unit's largest: what the torque channel may be off by is looked for within as much."""
+TOP = 1.2
+"""Torque up to which cells reach, in the unit's largest: an offset of the torque channel must not leave the class."""
 SHARED = 0.97
 """Share of the variance that neighbouring thresholds of friction, or torques of clearance and free play, have in common."""
 

@@ -421,9 +421,9 @@ def test_none_may_have_a_noise_of_its_own():
 
 def test_a_class_takes_of_another_what_is_denser_there():
     """Of another class only knots closer together than its own are taken (planted fault: all that differ), no flank twice."""
-    own = np.linspace(0.0, 1.4, 29)
+    own = np.linspace(0.0, 1.2, 25)
     dense = np.linspace(0.4, 0.5, 21)
-    other = np.r_[0.0, own[1:7] + 0.02, dense, 0.6, 1.4]
+    other = np.r_[0.0, own[1:7] + 0.02, dense, 0.6, 1.2]
     free = search.Search(reduce_unit(planted()), library_terms(), BASELINE)
     linear = free.first(Distortion())
     linear = free._anew(linear, reducer=replace(linear.reducer, knots=own, ratios=np.array([0.3])))

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from scipy.signal import lfilter
 
-from backdrive_bayes.bench.known_truth import LARGEST, BenchNoise, KnownReducer, angle_noise, physical_reducer, ramp
+from backdrive_bayes.bench.known_truth import BenchNoise, KnownReducer, angle_noise, physical_reducer, ramp
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.periodic import WAVE
@@ -33,7 +33,7 @@ def smooth_reducer(extra=None) -> KnownReducer:
     known = physical_reducer(np.random.default_rng(0), scatter=0.0)
     plays, steps = (known.reducer.part(n).cells for n in ("friction", "clearance"))
     friction = np.exp(-0.5 * (np.log(plays.threshold / 0.05) / 0.6) ** 2)
-    weights = known.weights | {"friction": 0.6 * friction / (friction @ (np.minimum(plays.up + plays.width, LARGEST) - plays.up))}
+    weights = known.weights | {"friction": 0.6 * friction / (friction @ plays.width)}
     if extra:
         size, low, high = extra
         covered = np.clip(np.minimum(steps.up + steps.width, high) - np.maximum(steps.up, low), 0.0, None)

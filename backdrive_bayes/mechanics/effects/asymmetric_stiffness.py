@@ -4,9 +4,8 @@ import numpy as np
 
 from backdrive_bayes.mechanics.effect import FlankEffect, PathEffect
 from backdrive_bayes.mechanics.history import played
-from backdrive_bayes.mechanics.part import TOP
 
-NODES = np.array([0.0, 0.01, 0.03, 0.08, 0.16, 0.28, 0.45, 0.65, 0.85, TOP])
+NODES = np.array([0.0, 0.01, 0.03, 0.08, 0.16, 0.28, 0.45, 0.65, 0.85, 1.2])
 BEHIND = (0.0, 0.02, 0.08, 0.3)
 """Thresholds of friction through which the even part may see the torque."""
 SMOOTH = 1.5
