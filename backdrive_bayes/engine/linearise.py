@@ -83,8 +83,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
         begun = _only(reach if LAW in some else lawless, some)
         return _likeliest(search(some, like).find_mode(like, at) for at in dict.fromkeys((begun, *near)))
 
-    def possible(linear: Linear) -> bool:
-        return WAVE not in linear.design.names or rises(linear, frequency)
+    def possible(found: dict[tuple[str, ...], Linear]) -> dict[tuple[str, ...], Linear]:
+        return {some: linear for some, linear in found.items() if WAVE not in linear.design.names or rises(linear, frequency)}
 
     if LAW not in bent and any(term.name in joint.design.names for term in all_effects()[LAW]):
         # A creep may stand for all of it.
@@ -93,12 +93,11 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     if bent:
         joint, none = _in_one_class(joint, search((), joint).learn(Distortion()), search)
         none = _likeliest((none, mode((), joint)))
-        apart: dict[tuple[str, ...], Linear] = {(name,): mode((name,), joint, none.distortion) for name in bent}
-        apart = {some: linear for some, linear in apart.items() if possible(linear)}
+        apart = possible({(name,): mode((name,), joint, none.distortion) for name in bent})
         # Of two that act together each alone is likelier than nothing; beside a law of the rate no creep acted.
         likelier = [some[0] for some, linear in apart.items() if LAW in some or linear.log_marginal > none.log_marginal]
-        apart |= {pair: mode(pair, joint) for pair in itertools.combinations(likelier, 2)}
-        modes = {None: joint, (): none} | {some: linear for some, linear in apart.items() if possible(linear)}
+        apart |= possible({pair: mode(pair, joint) for pair in itertools.combinations(likelier, 2)})
+        modes = {None: joint, (): none} | apart
         modes = _reached(modes | {(): _with_none(modes, search)})
     # At the joint mode a drift may stand for a wander.
     straight = modes.get((), joint)
