@@ -115,7 +115,8 @@ def _bends(time_s, z) -> np.ndarray:
 def _surge(time_s, z, at_s) -> np.ndarray | float:
     """Logarithm of the loading rate about instants [s] over the mean rate of a path that is straight between ``time_s``."""
     passed, span = np.r_[0.0, np.cumsum(np.abs(np.diff(z)))], time_s[-1] - time_s[0]
-    if not (span > 0.0 and passed[-1] > 0.0):
+    # About every instant of a path within the film lies the whole of it.
+    if not (span > 0.0 and passed[-1] > FILM):
         return 0.0
     usual = passed[-1] / span
     begin, end = (np.clip(at_s + sign * FILM / usual, time_s[0], time_s[-1]) for sign in (-1.0, 1.0))
