@@ -1,6 +1,6 @@
 """Blind check of `diagnose --simulated`: pairs of a simulator and a reality, effects and parameters withheld until scoring.
 
-    python studies/simulated_pairs.py run [--pairs 60] [--out reports/simulated]
+    python studies/simulated_pairs.py run [--pairs 60] [--workers 1] [--out reports/simulated]
     python studies/simulated_pairs.py score [--out reports/simulated]
 
 Three simulators stand against each reality:
@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
@@ -62,34 +63,46 @@ def answers_of(found: dict, seconds: float) -> dict:
 
 
 def run(args) -> None:
-    """Diagnose pairs that have no answer yet."""
+    """Diagnose pairs that have no answer yet, one reality after the other in each process."""
     args.out.mkdir(parents=True, exist_ok=True)
     answers, key = (_read(args.out / name) for name in ("answers.json", "key.json"))
-    for number in range(-(-args.pairs // VARIANTS)):
-        jobs = [f"{number}-{variant}" for variant in range(VARIANTS)] + ([f"{number}-swapped"] if number in SWAPPED else [])
-        if all(job in answers for job in jobs):
-            continue
-        reality = draw_reality(np.random.default_rng([args.seed, number]), number)
-        found = diagnose(reality.unit, seed=number)
-        for job in jobs:
-            swapped, began = job.endswith("swapped"), time.process_time()
-            variant = 0 if swapped else int(job[-1])
-            simulator = draw_simulator(np.random.default_rng([args.seed, number, variant]), reality, variant, number)
-            unit = _larger(simulator.unit) if swapped else simulator.unit
-            key[job] = {
-                "bench": reality.bench, "kind": KINDS[variant],
-                "reality": list(reality.effects), "simulator": list(simulator.effects),
-                "measured": reality.parameters(), "simulated": simulator.parameters,
-                "gap_rad": simulator.gap_rad, "remainder_rad": simulator.remainder_rad,
-            }  # fmt: skip
-            try:
-                fitted = read_simulator(unit, found.weighed.linear.reduced, number)
-                answers[job] = answers_of(compared(found, fitted, number, 0.03).json, time.process_time() - began)
-            except (BadInput, FloatingPointError, ValueError, np.linalg.LinAlgError) as error:
-                answers[job] = {"error": repr(error)[:300]}
-            _write(args.out / "answers.json", answers)
-            _write(args.out / "key.json", key)
-            print(job, "done", flush=True)
+    wanted = {number: _jobs(number) for number in range(-(-args.pairs // VARIANTS))}
+    with ProcessPoolExecutor(args.workers) as pool:
+        left = [number for number, jobs in wanted.items() if not all(job in answers for job in jobs)]
+        for done in as_completed([pool.submit(diagnose_pairs, args.seed, number) for number in left]):
+            found, truths = done.result()
+            answers, key = answers | found, key | truths
+            _write(args.out / "answers.json", {job: answers[job] for jobs in wanted.values() for job in jobs if job in answers})
+            _write(args.out / "key.json", {job: key[job] for jobs in wanted.values() for job in jobs if job in key})
+            print(*found, "done", flush=True)
+
+
+def _jobs(number: int) -> list[str]:
+    return [f"{number}-{variant}" for variant in range(VARIANTS)] + ([f"{number}-swapped"] if number in SWAPPED else [])
+
+
+def diagnose_pairs(seed: int, number: int) -> tuple[dict, dict]:
+    """Answers and truths of the pairs of one reality, by job."""
+    answers, key = {}, {}
+    reality = draw_reality(np.random.default_rng([seed, number]), number)
+    found = diagnose(reality.unit, seed=number)
+    for job in _jobs(number):
+        swapped, began = job.endswith("swapped"), time.process_time()
+        variant = 0 if swapped else int(job[-1])
+        simulator = draw_simulator(np.random.default_rng([seed, number, variant]), reality, variant, number)
+        unit = _larger(simulator.unit) if swapped else simulator.unit
+        key[job] = {
+            "bench": reality.bench, "kind": KINDS[variant],
+            "reality": list(reality.effects), "simulator": list(simulator.effects),
+            "measured": reality.parameters(), "simulated": simulator.parameters,
+            "gap_rad": simulator.gap_rad, "remainder_rad": simulator.remainder_rad,
+        }  # fmt: skip
+        try:
+            fitted = read_simulator(unit, found.weighed.linear.reduced, number)
+            answers[job] = answers_of(compared(found, fitted, number, 0.03).json, time.process_time() - began)
+        except (BadInput, FloatingPointError, ValueError, np.linalg.LinAlgError) as error:
+            answers[job] = {"error": repr(error)[:300]}
+    return answers, key
 
 
 def _larger(unit):
@@ -224,6 +237,7 @@ def main() -> None:
         one = verbs.add_parser(name)
         one.add_argument("--pairs", type=int, default=60)
         one.add_argument("--seed", type=int, default=SEED)
+        one.add_argument("--workers", type=int, default=1)
         one.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "reports" / "simulated")
         one.set_defaults(run=verb)
     args = parser.parse_args()
