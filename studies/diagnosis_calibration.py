@@ -239,13 +239,14 @@ def write_readme(table, calibration, packaged, fresh, pooled) -> None:
     lines += as_table(table)
     values = ", ".join(f"{f.name} {getattr(calibration, f.name):.2f}" for f in fields(calibration))
     lines += ["", f"Set on all benches: {values}.", ""]
+    error = f"{calibration_error(pooled, CALIBRATION):.3f}"
     kept = ", ".join(f"{f.name} {getattr(CALIBRATION, f.name):.2f}" for f in fields(CALIBRATION))
     lines += [
         f"The package's defaults: {kept}. With them:",
         "",
         *as_table(packaged),
         "",
-        f"Expected calibration error of the likeliest answer, all {len(pooled)} units: {calibration_error(pooled, CALIBRATION):.3f}.",
+        f"Expected calibration error of the likeliest answer, all {len(pooled)} units: {error}.",
         "",
         UNSEEN,
         "",

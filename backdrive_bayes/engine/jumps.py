@@ -18,9 +18,12 @@ from backdrive_bayes.engine.periodic import HARMONICS
 from backdrive_bayes.engine.residuals import block_of, residuals
 from backdrive_bayes.engine.sawtooth import Series, fit_noise, tooth_gain
 from backdrive_bayes.engine.traces import TRACE, trace_probabilities
+from backdrive_bayes.records.reduction import Blocks
 
 STEEP = 6.0
 """Slopes beyond so many times the median are clearances being crossed: nothing is looked for there."""
+STILL = 0.1
+"""Share of a record's loading rate below which its torque rests: a contact that nothing pushes on does not leap."""
 SAMPLES = 4
 """Samples in a correlation time of the noise, fewest samples in a tooth, and fewest teeth in a leg."""
 RATIO = 1.35
@@ -58,7 +61,8 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
     for r, (record, blocks, noise) in enumerate(zip(reduced.unit.records, reduced.blocks, reduced.noise, strict=True)):
         slope = np.abs(np.gradient(linear.predicted[r], blocks.mid_s))
         wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
-        calm = (wide < STEEP * np.median(slope)) & reduced.settled[r]
+        rests, share = standstill(blocks)
+        calm = (wide < STEEP * np.median(slope[~rests])) & ~rests & reduced.settled[r]
         block, rest = block_of(record, blocks), left[r]
         leg = np.where(calm, blocks.leg, -1)[block]
         if wave is not None:
@@ -67,10 +71,17 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
         width = max(1, round(noise.correlation_time_s / SAMPLES / step))
         series = even_series(rest * blocks.direction[blocks.leg[block]], leg, width)
         if series is not None:
-            rate = float(reduced.context.rate[r])
+            rate = float(reduced.context.rate[r]) / (1.0 - share)
             # Correlated noise as it was estimated holds the teeth themselves.
             found.append(Teeth(series, width * step * rate, TRACE * noise.white_rad))
     return found
+
+
+def standstill(blocks: Blocks) -> tuple[np.ndarray, float]:
+    """Blocks in which the torque rests, (blocks,), and their share of the record's time."""
+    span, time = np.abs(np.diff(blocks.edges_nm(), axis=0))[0], blocks.end_s - blocks.begin_s
+    rests = span / time < STILL * np.average(span / time, weights=span)
+    return rests, float(time[rests].sum() / time.sum())
 
 
 def without_wave(rest, angle, leg, frequency: float) -> np.ndarray:

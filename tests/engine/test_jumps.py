@@ -5,9 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from backdrive_bayes.engine.jumps import SEEN, Teeth, even_series, weigh_teeth, without_wave
+from backdrive_bayes.engine import jumps
+from backdrive_bayes.engine.jumps import SEEN, Teeth, even_series, find_jumps, standstill, weigh_teeth, without_wave
+from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.engine.residuals import between_blocks
 from backdrive_bayes.engine.sawtooth import FAR, STRAY, Noise, Series, _holds, fit_noise, tooth_gain
+from backdrive_bayes.records.record import Record, Unit
 
 COUNT = 2000
 LEG = np.repeat([-1, 1, 2, 3], COUNT // 4)
@@ -168,3 +171,35 @@ def test_a_torque_in_stairs_is_no_stick_slip():
 
 def test_the_noise_of_a_straight_torque_is_not_taken_for_stairs():
     assert np.abs(between_blocks(*stairs(noise_nm=1e-3, step=0.0), 1e-3)).max() < 3e-4
+
+
+def resting(dwell_s, seed=3):
+    """A unit of constant compliance whose torque goes to and fro with a rest at each tip; its contact sticks and leaps while it
+    is pushed on, and its rests are of half the time where they last as long as a leg."""
+    rng, records = np.random.default_rng(seed), []
+    for rate in (0.5, 1.0):
+        tips = np.cumsum([0.0, 1.0 / rate, dwell_s / rate, *[2.0 / rate, dwell_s / rate] * 4])
+        time = np.arange(0.0, tips[-1], 0.004 / rate)
+        torque = np.interp(time, tips, [0.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
+        travel = np.r_[0.0, np.cumsum(np.abs(np.diff(torque)))]
+        held = travel - np.maximum.accumulate(np.where(np.diff(travel // 0.1, prepend=0.0) > 0, travel, 0.0))
+        sense = np.where(np.searchsorted(tips[2::2], time) % 2, -1.0, 1.0)
+        angle = 0.01 * torque - 3e-4 * sense * held / 0.1 + 1e-4 * rng.standard_normal(time.size)
+        records.append(Record(f"{rate}.csv", time, torque + 1e-4 * rng.standard_normal(time.size), angle, rate, 1.0))
+    reduced = reduce_unit(Unit("resting", 1.0, tuple(records)))
+    return SimpleNamespace(reduced=reduced, predicted=[0.01 * b.torque_nm / reduced.angle_scale_rad for b in reduced.blocks])
+
+
+@pytest.mark.parametrize(("dwell_s", "share"), [(0.0, 0.0), (0.5, 0.2), (2.0, 0.5)])
+def test_where_the_torque_rests_is_seen(dwell_s, share):
+    for blocks in resting(dwell_s).reduced.blocks:
+        assert standstill(blocks)[1] == pytest.approx(share, abs=0.03)
+
+
+def test_a_contact_that_is_not_pushed_on_does_not_leap(monkeypatch):
+    """A planted fault: teeth are looked for while the torque rests, at half the torque from sample to sample."""
+    moving, rested = (find_jumps(resting(dwell_s)).log_factor for dwell_s in (0.0, 2.0))
+    assert moving > 30 and rested > 0.7 * moving
+    monkeypatch.setattr(jumps, "standstill", lambda blocks: (np.zeros(blocks.count.size, bool), 0.0))
+    assert find_jumps(resting(0.0)).log_factor == moving
+    assert find_jumps(resting(2.0)).log_factor < 0.0
