@@ -67,13 +67,13 @@ def run(args) -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     answers, key = (_read(args.out / name) for name in ("answers.json", "key.json"))
     wanted = {number: _jobs(number) for number in range(-(-args.pairs // VARIANTS))}
+    left = [number for number, jobs in wanted.items() if not all(job in answers and job in key for job in jobs)]
     with ProcessPoolExecutor(args.workers) as pool:
-        left = [number for number, jobs in wanted.items() if not all(job in answers for job in jobs)]
         for done in as_completed([pool.submit(diagnose_pairs, args.seed, number) for number in left]):
             found, truths = done.result()
             answers, key = answers | found, key | truths
-            _write(args.out / "answers.json", {job: answers[job] for jobs in wanted.values() for job in jobs if job in answers})
-            _write(args.out / "key.json", {job: key[job] for jobs in wanted.values() for job in jobs if job in key})
+            _write(args.out / "key.json", key)
+            _write(args.out / "answers.json", answers)
             print(*found, "done", flush=True)
 
 
@@ -113,8 +113,10 @@ def _read(path):
     return json.loads(path.read_text()) if path.exists() else {}
 
 
-def _write(path, obj):
-    path.write_text(json.dumps(obj, indent=0, default=float))
+def _write(path, table):
+    """Write pairs in the order of their numbers."""
+    ordered = {job: table[job] for job in sorted(table, key=lambda job: (int(job.split("-")[0]), job))}
+    path.write_text(json.dumps(ordered, indent=0, default=float))
 
 
 def pair_scores(row: dict, truth: dict) -> dict:

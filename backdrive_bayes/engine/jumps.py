@@ -22,8 +22,9 @@ from backdrive_bayes.records.reduction import Blocks
 
 STEEP = 6.0
 """Slopes beyond so many times the median are clearances being crossed: nothing is looked for there."""
-STILL = 0.1
-"""Share of a record's loading rate below which its torque rests: a contact that nothing pushes on does not leap."""
+SLOW, RESTING = 0.1, 0.02
+"""Share of a record's travel that is run at less than its slow loading rate, and the share of that rate below which the torque
+rests: a contact that nothing pushes on does not leap, and keeps its state until it is pushed on."""
 SAMPLES = 4
 """Samples in a correlation time of the noise, fewest samples in a tooth, and fewest teeth in a leg."""
 RATIO = 1.35
@@ -62,14 +63,14 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
         slope = np.abs(np.gradient(linear.predicted[r], blocks.mid_s))
         wide = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
         rests, share = standstill(blocks)
-        calm = (wide < STEEP * np.median(slope[~rests])) & ~rests & reduced.settled[r]
+        calm = (wide < STEEP * np.median(slope[~rests])) & reduced.settled[r]
         block, rest = block_of(record, blocks), left[r]
-        leg = np.where(calm, blocks.leg, -1)[block]
+        leg, moves = np.where(calm, blocks.leg, -1)[block], ~rests[block]
         if wave is not None:
             rest = without_wave(rest, np.interp(record.time_s, blocks.mid_s, linear.predicted[r]), leg, wave)
         step = float(np.median(np.diff(record.time_s)))
         width = max(1, round(noise.correlation_time_s / SAMPLES / step))
-        series = even_series(rest * blocks.direction[blocks.leg[block]], leg, width)
+        series = even_series((rest * blocks.direction[blocks.leg[block]])[moves], leg[moves], width)
         if series is not None:
             rate = float(reduced.context.rate[r]) / (1.0 - share)
             # Correlated noise as it was estimated holds the teeth themselves.
@@ -80,7 +81,10 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
 def standstill(blocks: Blocks) -> tuple[np.ndarray, float]:
     """Blocks in which the torque rests, (blocks,), and their share of the record's time."""
     span, time = np.abs(np.diff(blocks.edges_nm(), axis=0))[0], blocks.end_s - blocks.begin_s
-    rests = span / time < STILL * np.average(span / time, weights=span)
+    rate = span / time
+    slowest = np.argsort(rate)
+    travel = np.cumsum(span[slowest])
+    rests = rate < RESTING * rate[slowest][np.searchsorted(travel, SLOW * travel[-1])]
     return rests, float(time[rests].sum() / time.sum())
 
 
