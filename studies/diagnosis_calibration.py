@@ -208,8 +208,8 @@ def confidence(rows, calibration) -> str:
     told = curve([max(f.values()) for f in found], hit)
     said, error, chance = told["mean_probability"], told["expected_error"], told["error_if_calibrated"]["q95"]
     return (
-        f"The likeliest answers of all {told['of']} have a probability of {said:.2f} on average, {told['hit_rate']:.2f} of "
-        f"them are right; expected calibration error {error:.3f} (were all probabilities right, up to {chance:.3f} by chance)."
+        f"The likeliest answer has a probability of {said:.2f} on average over all {told['of']} units and is right in "
+        f"{told['hit_rate']:.2f}; expected calibration error {error:.3f} (were all probabilities right, up to {chance:.3f} by chance)."
     )
 
 
