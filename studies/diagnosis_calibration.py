@@ -206,10 +206,10 @@ def confidence(rows, calibration) -> str:
     found = [answers(r, calibration) for r in rows]
     hit = [next(iter(f)) == right(r) for f, r in zip(found, rows, strict=True)]
     told = curve([max(f.values()) for f in found], hit)
-    said, error, chance = told["mean_probability"], told["expected_error"], told["error_if_calibrated"]["q95"]
+    said, held, error, chance = (told[k] for k in ("mean_probability", "hit_rate", "expected_error", "error_if_calibrated"))
     return (
-        f"The likeliest answer has a probability of {said:.2f} on average over all {told['of']} units and is right in "
-        f"{told['hit_rate']:.2f}; expected calibration error {error:.3f} (were all probabilities right, up to {chance:.3f} by chance)."
+        f"The likeliest answer has a probability of {said:.2f} on average over all {told['of']} units and is right in {held:.2f}; "
+        f"expected calibration error {error:.3f} (were all probabilities right, up to {chance['q95']:.3f} by chance)."
     )
 
 
