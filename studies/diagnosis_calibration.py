@@ -208,7 +208,7 @@ def confidence(rows, calibration) -> str:
     told = curve([max(f.values()) for f in found], hit)
     said, held, error, chance = (told[k] for k in ("mean_probability", "hit_rate", "expected_error", "error_if_calibrated"))
     return (
-        f"The likeliest answer has a probability of {said:.2f} on average over all {told['of']} units and is right in {held:.2f}; "
+        f"The likeliest answer has a probability of {said:.2f} in the mean of {told['of']} units and is right in {held:.2f}; "
         f"expected calibration error {error:.3f} (were all probabilities right, up to {chance['q95']:.3f} by chance)."
     )
 
