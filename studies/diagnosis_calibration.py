@@ -54,13 +54,14 @@ teeth of stick-slip are looked for only while the torque moves. No row of the pr
 units here and below whose torque rests for more than 2 % of the time, 68 were weighed anew (without joining what lies on both
 sides of a rest within a leg): one name changed, the twelfth bench's case 7, rightly, and no other answer by more than 0.8 of the
 logarithm."""
-FRESH = """`studies/eleventh_outside_bench.py --units 80 --seed 111` and `studies/twelfth_outside_bench.py --units 80 --seed 121`,
-written without sight of the package and run whole before they were looked at. When the eleventh was, with `unlisted` at -2.3,
-exact was 0.69, none 0.83 and the log score -1.02. Vibration that all records share is found since, with two of its units in view.
-The twelfth had exact 0.57, strong 0.50, none 0.96, unlisted 0.31, listed for unlisted 0.31, pairs 0.25, sets 0.90 and a log score
-of -1.60: its unlisted kinds are nearer to listed effects, its clean reducers have more than one clearance, and of the friction
-that depends on the rate none of four units is named. The scores below are of that run. Teeth of stick-slip are looked for only
-while the torque moves since, with two of its units in view."""
+FRESH = """`studies/eleventh_outside_bench.py --units 80 --seed 111` and `studies/twelfth_outside_bench.py --units 80 --seed
+121`, written without sight of the package and run whole before they were looked at. When the eleventh was, with `unlisted` at
+-2.3, exact was 0.69, none 0.83 and the log score -1.02. Vibration that all records share is found since, with two of its units
+in view. The twelfth, which shares the eleventh's paths and chain of effects (`studies/outside_units.py`) but no mechanics, had
+exact 0.57, strong 0.50, none 0.96, unlisted 0.31, listed for unlisted 0.31, pairs 0.25, sets 0.90 and a log score of -1.60: its
+unlisted kinds are nearer to listed effects, its clean reducers have more than one clearance, and of the friction that depends
+on the rate none of four units is named. The scores below are of that run. Teeth of stick-slip are looked for only while the
+torque moves since, with two of its units in view."""
 HANDS = {"foreign": "foreign", "contact": "own", "mujoco": "own", "ode": "own", "sliders": "own"}
 """Whose hand a bench is of; all others are outside benches, of which the hands are alike."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]

@@ -22,7 +22,7 @@ from backdrive_bayes.records.reduction import Blocks
 
 STEEP = 6.0
 """Slopes beyond so many times the median are clearances being crossed: nothing is looked for there."""
-SLOW, RESTING = 0.1, 0.02
+SLOW, AT_REST = 0.1, 0.02
 """Share of a record's travel that is run at less than its slow loading rate, and the share of that rate below which the torque
 rests: a contact that nothing pushes on does not leap, and keeps its state until it is pushed on."""
 SAMPLES = 4
@@ -84,7 +84,7 @@ def standstill(blocks: Blocks) -> tuple[np.ndarray, float]:
     rate = span / time
     slowest = np.argsort(rate)
     travel = np.cumsum(span[slowest])
-    rests = rate < RESTING * rate[slowest][np.searchsorted(travel, SLOW * travel[-1])]
+    rests = rate < AT_REST * rate[slowest][np.searchsorted(travel, SLOW * travel[-1])]
     return rests, float(time[rests].sum() / time.sum())
 
 
