@@ -20,7 +20,7 @@ hypoid_duhem       contact films that follow an S-shaped law over a sliding memo
 Every reducer has an output seal too: a compliant slider with a plain play threshold. stick_slip acts on this slider,
 rate_dependent_friction and x_thixotropic_grease on all friction of the reducer, x_scuffed_flank on its load-proportional part.
 
-Conventions: What never settles (x_running_in_wear, x_thixotropic_grease, x_warming_softens) has that truth by convention; the
+Conventions: what never settles (x_running_in_wear, x_thixotropic_grease, x_warming_softens) has that truth by convention; the
 rest as in outside_units.py.
 Unlisted kinds: x_running_in_wear (clearance grows from cycle to cycle), x_coupling_jump (encoder coupling slips at instants),
 x_floor_vibration (narrow-band in time), x_chip_in_mesh (a chip holds one flank off until crushed, in every cycle),
