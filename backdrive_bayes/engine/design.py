@@ -168,17 +168,17 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
             by = [(a - b) / STEP for a, b in zip(class_prediction(reduced, reducer, moved, weights), base, strict=True)]
             late = by if effect.parameter == "lag_s" else late
             groups.append(_columns(effect.name, by))
-    for part in (0, 1):
-        groups += _growth_groups(reduced, reducer, design, grown, weights, [e for e in growths if e.part == part])
+    for part in range(len(GROWING)):
+        groups += _growth_groups(reduced, reducer, design, distortion, grown, weights, [e for e in growths if e.part == part])
     return tuple(groups)
 
 
-def _growth_groups(reduced, reducer, design, grown, weights, effects) -> list[Group]:
+def _growth_groups(reduced, reducer, design, distortion, grown, weights, effects) -> list[Group]:
     """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion."""
 
     def laws(along):
         rates = zip(reduced.context.log_rate, along, strict=True)
-        return [reduced.context.law(rate + history.surge, history.log_amplitude) for rate, history in rates]
+        return [distortion.law(rate + history.surge, history.log_amplitude, reduced.context) for rate, history in rates]
 
     read = laws(histories(reduced, UNDISTORTED))
     identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in read])) > LEAST_RANGE]

@@ -41,7 +41,7 @@ def _gains(linear: Linear, ratios: list[float]) -> list[float]:
     data, scale = linear.data, np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index]
     grown = grown_histories(linear.reduced, linear.distortion)
     groups = tuple(
-        Group("flanks", tuple(cells.grown(growth[0]).means(history) @ mixing for history, growth in grown))
+        Group("flanks", tuple(cells.grown(growth[0], growth[2]).means(history) @ mixing for history, growth in grown))
         for cells, mixing in map(flank, ratios)
     )
     rows = np.column_stack([data.x, linear.whitened(Design(groups)).x, data.y])

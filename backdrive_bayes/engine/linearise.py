@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from backdrive_bayes.engine.design import Group, grown_histories
+from backdrive_bayes.engine.knots import LEAST_APART
 from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import WAVE, clearest_wave, log_prior, periodic_group, rises
 from backdrive_bayes.engine.reduced import Reduced
-from backdrive_bayes.engine.search import BENDING, LAW, LEAST_APART, Search, length
+from backdrive_bayes.engine.search import BENDING, LAW, Search, length
 from backdrive_bayes.engine.start import possible_starts
 from backdrive_bayes.engine.wander import learn_wander
 from backdrive_bayes.mechanics.effect import Distortion, Effect
@@ -73,15 +74,16 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     bent = _bent(joint, reach)
     lawless = _by_amplitude(joint, reach)
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
-    reach = replace(reach, friction_exponent=0.0, friction_bend=0.0)
+    reach = replace(reach, friction_exponent=0.0)
+    dragged = replace(reach, drag_exponent=0.0, shaft_drag=starts[-1].shaft_drag)
 
     def search(some: tuple[str, ...] | None, like: Linear) -> Search:
         fixed = (*free.fixed, *(waves if some is None or WAVE in some else ()))
         return replace(free, reduced=like.reduced, fixed=fixed, only=some)
 
     def mode(some: tuple[str, ...], like: Linear, *near: Distortion) -> Linear:
-        begun = _only(reach if LAW in some else lawless, some)
-        return _likeliest(search(some, like).find_mode(like, at) for at in dict.fromkeys((begun, *near)))
+        begun = [_only(at, some) for at in ((reach, dragged) if LAW in some else (lawless,))]
+        return _likeliest(search(some, like).find_mode(like, at) for at in _apart([*begun, *near], context))
 
     def possible(found: dict[tuple[str, ...], Linear]) -> dict[tuple[str, ...], Linear]:
         return {some: linear for some, linear in found.items() if WAVE not in linear.design.names or rises(linear, frequency)}
@@ -155,8 +157,8 @@ def _calm(linear: Linear) -> Linear:
 def _by_amplitude(joint: Linear, reach: Distortion) -> Distortion:
     """The same where thresholds follow the amplitude alone, as nearly as that makes them grow as much."""
     along, context = grown_histories(joint.reduced, reach), joint.reduced.context
-    law = np.array([context.law(0.0, history.log_amplitude)[2:] for history, _ in along])
-    growth = np.array([[np.mean(g) for g in grown] for _, grown in along])
+    law = np.array([context.law(0.0, history.log_amplitude)[1:3] for history, _ in along])
+    growth = np.array([[np.mean(g) for g in grown[:2]] for _, grown in along])
     if np.ptp(law[:, 0]) < LEAST_RANGE:
         return reach
     (friction, drag), (friction_bend, drag_bend) = np.linalg.lstsq(law, growth - growth.mean(axis=0), rcond=COLLINEAR)[0].tolist()

@@ -118,7 +118,7 @@ class Posterior:
                 even = self.reducer.flank_columns(history, mean, growth, ends=True)
                 found = found + self.flat[effect.name] @ even.T
             elif isinstance(effect, GrowthEffect):
-                term = self.context.law(log_rate, history.log_amplitude)[effect.term]
+                term = self.distortion.law(log_rate, history.log_amplitude, self.context)[effect.term]
                 (grown,) = self.reducer.grown(history, mean, growth, effect.part, [term], ends=True)
                 away = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter)
                 found = found + np.outer(away, grown)

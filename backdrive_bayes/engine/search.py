@@ -6,29 +6,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backdrive_bayes.engine.design import Group, class_groups, class_priors, histories, path_group, tangent_groups
+from backdrive_bayes.engine.design import Group, class_groups, class_priors, path_group, tangent_groups
 from backdrive_bayes.engine.flanks import RATIOS, select_flank
 from backdrive_bayes.engine.jitter import USUAL_JITTER, learn_jitter
+from backdrive_bayes.engine.knots import finer, first_knots, least_distance
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import SWEEPS, find_scales, whiten
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.reduced import Jitter, Reduced
 from backdrive_bayes.engine.traces import trace_levels
-from backdrive_bayes.mechanics.clearance import joined, place_knots, spaced
+from backdrive_bayes.mechanics.clearance import joined, spaced
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
-from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.mechanics.registry import all_effects
 
-KNOTS, MOST_KNOTS = 60, 140
-"""Knots of clearance and free play at first, and refined."""
 MOST_FLANKS = 3
 """Flanks at most: each adds some 25 weights. They are selected before the jitter is learnt, which would absorb their residual."""
-LEAST_APART = 0.3
-"""Least distance of knots in the torque noise of a sample."""
-CONSPICUOUS = 3.5
-"""Whitened residual beyond which the knots near a block are refined."""
 LEARNINGS = 4
 """How often the class is refined and the jitter learnt at most: a prediction made with too little jitter hides most of it."""
 STEPS = 40
@@ -45,7 +39,7 @@ LAW, CREEP = "rate_dependent_friction", "viscoelastic_creep"
 BENDING = {
     "torque_offset": ("offset",),
     "sensor_lag": ("lag_s",),
-    LAW: ("friction_exponent", "drag_exponent", "friction_bend", "drag_bend"),
+    LAW: ("friction_exponent", "drag_exponent", "shaft_drag"),
 }
 """Effects whose columns are derivatives, and the places of their parameters in a distortion."""
 WIDE = 2.0
@@ -75,7 +69,7 @@ class Search:
         """The linear model about a distortion with the class, jitter and noise that every unit begins with."""
         reduced, usual = self.reduced, USUAL_JITTER
         jitter = Jitter(usual.torque * reduced.context.torque_noise, usual.length)
-        reducer = ReducerClass(self._knots(distortion), self.modules)
+        reducer = ReducerClass(first_knots(reduced, distortion), self.modules)
         linear = self._linear(reducer, distortion, reduced.covariances(reduced.read_slopes, jitter), {}, jitter, set())
         return self._anew(linear)
 
@@ -97,7 +91,7 @@ class Search:
         own, gaps = linear.reducer, np.diff(other.knots, prepend=-np.inf, append=np.inf)
         knots = joined(own.knots, other.knots, 0.5 * np.minimum(gaps[1:], gaps[:-1]))
         ratios = joined(own.ratios, other.ratios, np.full(other.ratios.size, np.diff(RATIOS).max()))
-        reducer = replace(own, knots=spaced(knots, _least(self.reduced)), ratios=ratios)
+        reducer = replace(own, knots=spaced(knots, least_distance(self.reduced)), ratios=ratios)
         return self._refined(self._anew(linear, reducer=reducer))
 
     def with_own_noise(self, linear: Linear) -> Linear:
@@ -110,8 +104,8 @@ class Search:
         best = linear
         for _ in range(LEARNINGS):
             before, linear = linear, self._anew(linear, jitter=learn_jitter(linear)) if learning else linear
-            finer = _finer(linear)
-            refined = self._anew(linear, reducer=finer) if finer.knots.size > linear.reducer.knots.size else linear
+            reducer = finer(linear)
+            refined = self._anew(linear, reducer=reducer) if reducer.knots.size > linear.reducer.knots.size else linear
             best = max((best, linear, refined), key=lambda one: one.log_marginal)
             if refined is linear and linear.jitter == before.jitter:
                 break
@@ -174,13 +168,6 @@ class Search:
             values[own], held[own] = getattr(at or linear.distortion, effect.parameter), True
             scale[own] = np.exp(log_scale[effect.name])
         return float(linear.data.moments.holding(values, held, scale).log_marginal(scale[~held])) + linear.data.log_volume
-
-    def _knots(self, distortion):
-        torques, context = [], self.reduced.context
-        for r, (history, settled) in enumerate(zip(histories(self.reduced, distortion), self.reduced.settled, strict=True)):
-            middle = history.mean(history.z0[:, None], history.z1[:, None])[:, 0]
-            torques.append(middle[settled] * np.exp(-distortion.growth(context.log_rate[r], history.log_amplitude, context)[1]))
-        return place_knots(np.concatenate(torques), KNOTS, LEAST_APART * self.reduced.context.torque_noise)
 
     def _linear(self, reducer, distortion, covariances, known, jitter, idle, weights=None, sweeps=SWEEPS):
         """The linear model about a distortion; derivatives are those at ``weights``, by default the ones that fit best there."""
@@ -265,31 +252,11 @@ def _shift(design, distortion, effects, context):
 
 def _units(distortion, context) -> dict[str, float]:
     """What counts as a step of one by parameter: the torque scale, a lag that makes as much of it, or EXPONENTS."""
-    return dict.fromkeys(vars(distortion), EXPONENTS) | {"offset": 1.0, "lag_s": 1.0 / context.rate.max()}
+    torques = {"offset": 1.0, "shaft_drag": 1.0, "lag_s": 1.0 / context.rate.max()}
+    return dict.fromkeys(vars(distortion), EXPONENTS) | torques
 
 
 def length(moved, distortion, context) -> float:
     """Largest part of the step between two distortions, in shares of the torque scale."""
     units = _units(distortion, context)
     return max(abs(getattr(moved, n) - getattr(distortion, n)) / unit for n, unit in units.items())
-
-
-def _least(reduced: Reduced) -> float:
-    """Least distance of knots in a refined class, in shares of the torque scale."""
-    return 0.8 * LEAST_APART * reduced.context.torque_noise
-
-
-def _finer(linear) -> ReducerClass:
-    """The class with more knots where settled blocks leave a conspicuous residual, the worst first until there are MOST_KNOTS."""
-    reduced, knots, wanted = linear.reduced, linear.reducer.knots, []
-    for blocks, white, settled in zip(reduced.blocks, linear.residuals(), reduced.settled, strict=True):
-        low, high = blocks.edges_nm() / reduced.torque_scale_nm
-        for i in np.flatnonzero((np.abs(white) > CONSPICUOUS) & settled).tolist():
-            about = range(max(i - 1, 0), min(i + 2, white.size))
-            wanted.append((abs(white[i]), np.concatenate([np.linspace(low[j], high[j], 5) for j in about])))
-    wanted.sort(key=lambda found: -found[0])
-    for _, torques in wanted:
-        inner = np.unique(np.r_[knots[:-1], np.abs(torques)])
-        finer = spaced(np.r_[inner[inner < TOP], TOP], _least(reduced))
-        knots = finer if finer.size <= MOST_KNOTS else knots
-    return replace(linear.reducer, knots=knots)

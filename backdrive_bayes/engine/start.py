@@ -19,12 +19,13 @@ LONG, HALF = 0.6, 0.4
 """Share of a record's torque range that a leg spans at least to be compared, and where no two of them do."""
 NEAR, LEAST = 0.3, 0.4
 """How near to its ends, in shares of half its range, a leg still knows where it began, and the least share of it to compare."""
-USUAL = np.array([0.2, 1.0])
-"""Standard deviations by which the least squares are held: lag [torque scale a unit rate], exponent."""
+USUAL = np.array([0.2, 1.0, 0.2])
+"""Standard deviations by which the least squares are held: lag [torque scale a unit rate], exponent, drag [torque scale]."""
 
 
 def possible_starts(reduced: Reduced) -> list[Distortion]:
-    """Distortions worth starting from: with the offset alone, with a lag, with a drag exponent, with both."""
+    """Distortions worth starting from: with the offset alone, with a lag, with a drag exponent, with both, with a drag at the
+    shaft."""
     context, crossings, offset = reduced.context, _crossings(reduced), _oddest_offset(reduced)
     if len(crossings) < 3:
         return [Distortion(offset)]
@@ -35,14 +36,16 @@ def possible_starts(reduced: Reduced) -> list[Distortion]:
     late = ((torque - base) * weight).sum(axis=1) / weight.sum()
     at = max(float((np.abs(base) * weight).sum() / weight.sum()), 1e-3)
     fastest = context.rate.max()
-    design = np.column_stack([np.ones(late.size), context.rate[record] / fastest, at * context.log_rate[record]])
+    share = context.rate[record] / fastest
+    design = np.column_stack([np.ones(late.size), share, at * context.log_rate[record], np.sqrt(share)])
     held = np.diag(np.r_[0.0, 1e-2 / USUAL])
     starts = []
-    for used in ([1, 0, 0], [1, 1, 0], [1, 0, 1], [1, 1, 1]):
-        found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(3)], rcond=None)[0] * used
+    for used in ([1, 0, 0, 0], [1, 1, 0, 0], [1, 0, 1, 0], [1, 1, 1, 0], [1, 0, 0, 1]):
+        found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(4)], rcond=None)[0] * used
         if found[1] < 0.0:
             continue
-        starts.append(Distortion(offset, float(found[1] / fastest), 0.0, float(np.clip(found[2], -0.5, 0.5))))
+        exponent = float(np.clip(found[2], -0.5, 0.5))
+        starts.append(Distortion(offset, float(found[1] / fastest), drag_exponent=exponent, shaft_drag=float(found[3])))
     return starts
 
 

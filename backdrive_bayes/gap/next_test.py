@@ -76,7 +76,7 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
         elif isinstance(effect, FlankEffect):
             angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight
         elif isinstance(effect, GrowthEffect):
-            term = context.law(log_rate, history.log_amplitude)[effect.term]
+            term = linear.distortion.law(log_rate, history.log_amplitude, context)[effect.term]
             (by,) = linear.reducer.grown(history, mean, growth, effect.part, [term], ends=True)
             angle = angle + (float(weight[0]) - getattr(linear.distortion, effect.parameter)) * by
         elif isinstance(effect, TangentEffect):

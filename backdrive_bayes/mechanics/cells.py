@@ -29,7 +29,8 @@ class Cells:
     """Odd pairs of cells, arrays of shape (cells,) in shares of the torque scale.
 
     The response of a pair runs from -width to +width and is divided by ``norm``; ``fall`` is the width of the lower switching
-    torques, by default the same. ``growth`` is that of the thresholds along a history, None where they stay.
+    torques, by default the same. ``growth`` is that of the thresholds along a history and ``drag`` what is added to them, None
+    where they stay.
     """
 
     up: np.ndarray
@@ -38,6 +39,7 @@ class Cells:
     norm: np.ndarray
     fall: np.ndarray = field(default_factory=lambda: np.empty(0))
     growth: np.ndarray | None = None
+    drag: np.ndarray | None = None
 
     def __post_init__(self):
         if self.fall.size == 0:
@@ -63,12 +65,14 @@ class Cells:
         """Which pairs cross up at positive torques and down at the opposite ones, (cells,)."""
         return (np.abs(self.up + self.down + self.width) <= 1e-8 + 1e-5 * np.abs(self.up)) & (self.up >= 0.0)
 
-    def grown(self, growth) -> Cells:
-        """The cells with every threshold multiplied by exp(``growth``), one logarithm or one at either end of every segment of
-        the histories to come, (2, segments)."""
-        if np.ndim(growth):
-            return replace(self, growth=growth)
-        return self.wider(float(np.exp(growth))) if growth else self
+    def grown(self, growth, drag=0.0) -> Cells:
+        """The cells with every threshold multiplied by exp(``growth``) and ``drag`` added to it, as of a play before the whole
+        operator; each one number or one at either end of every segment of the histories to come, (2, segments)."""
+        if np.ndim(growth) or np.ndim(drag):
+            growth, drag = np.broadcast_arrays(growth, drag)
+            return replace(self, growth=growth, drag=drag)
+        wide = self.wider(float(np.exp(growth))) if growth else self
+        return replace(wide, up=wide.up + drag, down=wide.down - drag) if drag else wide
 
     def wider(self, factor: float) -> Cells:
         """The same cells with every threshold multiplied by ``factor``; clearances keep their share of the relays, and stay
@@ -111,7 +115,8 @@ class Cells:
         follows = self.clearance & (self.up + self.width <= CROSSED)
         first, more = (np.where(self.clearance, 0.0, of) for of in self._thresholds)
         # The first relay of a mirror image is the mirror image of the last.
-        return *np.exp(self.growth), np.r_[first, first + more], np.r_[more, -more], np.tile(follows, 2)
+        along = *np.exp(self.growth), *np.ascontiguousarray(self.drag, float)
+        return *along, np.r_[first, first + more], np.r_[more, -more], np.tile(follows, 2)
 
     @cached_property
     def _both(self):

@@ -13,6 +13,8 @@ MOST_GROWTH = 3.0
 """Log factor of thresholds beyond which no law of the rate is followed."""
 LEAST_GROWTH = 2e-3
 """Range of that factor along a history below which its mean stands for it."""
+LEAST_DRAG = 1e-5
+"""The same of a drag before all parts, in shares of the torque scale."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +40,12 @@ class Context:
         return np.log(self.rate) - np.log(self.rate).mean()
 
     def law(self, log_rate, log_amplitude: float) -> tuple:
-        """What growths are multiplied by: exponent and bend of a law of the rate, each like ``log_rate``, and exponent and bend
-        of one of the amplitude; the records' mean is none."""
+        """What growths are multiplied by: the exponent of a law of the rate, like ``log_rate``, exponent and bend of one of the
+        amplitude, of which the records' mean is none, and a drag before all parts, like the root of the rate over the largest."""
         own = np.log(self.amplitude) - np.log(self.amplitude).mean()
         apart = log_amplitude - float(np.log(self.amplitude).mean())
-        return log_rate, log_rate**2 - np.mean(self.log_rate**2), apart, apart**2 - float(np.mean(own**2))
+        root = np.exp(0.5 * np.minimum(log_rate - self.log_rate.max(), MOST_GROWTH))
+        return log_rate, apart, apart**2 - float(np.mean(own**2)), root
 
 
 @dataclass(frozen=True)
@@ -97,8 +100,8 @@ class TangentEffect(Effect):
 class GrowthEffect(TangentEffect):
     """An effect by which the thresholds of one part follow the rate at the moment: the derivative by a term of the law.
 
-    ``part`` is the number of friction (0) or drag (1), ``term`` that of exponent (0) or bend (1) of the
-    rate, or of the amplitude (2 and 3).
+    ``part`` is the number of friction (0), of drag (1) or of a drag before all parts (2), ``term`` that of the exponent of the
+    rate (0), of exponent and bend of the amplitude (1 and 2) or of the root of the rate (3).
     """
 
     part: int = 0
@@ -120,27 +123,35 @@ class Distortion:
     """How a channel and the rate distort what the class sees; all zero for an ideal bench and a rate-independent reducer.
 
     ``offset`` is a share of the torque scale, ``lag_s`` in seconds; the logarithms of friction and drag thresholds follow the log
-    of the rate with these exponents and bends, and that of the amplitude likewise: a law of either has the same freedom.
+    of the rate with these exponents, and that of the amplitude with these and bends. ``shaft_drag`` is a share of the torque
+    scale at the largest rate, or at rest where it falls with the rate (negative).
     """
 
     offset: float = 0.0
     lag_s: float = 0.0
     friction_exponent: float = 0.0
     drag_exponent: float = 0.0
-    friction_bend: float = 0.0
-    drag_bend: float = 0.0
     friction_amplitude: float = 0.0
     drag_amplitude: float = 0.0
     friction_amplitude_bend: float = 0.0
     drag_amplitude_bend: float = 0.0
+    shaft_drag: float = 0.0
+
+    def law(self, log_rate, log_amplitude: float, context: Context) -> tuple:
+        """Derivatives of the growths by their parameters, as :meth:`Context.law`: no drag helps the motion, so that one which
+        falls with the rate is none at the largest."""
+        *terms, root = context.law(log_rate, log_amplitude)
+        return *terms, root - float(self.shaft_drag < 0.0)
 
     def growth(self, log_rate, log_amplitude: float, context: Context) -> tuple:
-        """Logarithms of the factors of friction and drag thresholds, each like ``log_rate``: one rate or many."""
-        friction = self.friction_exponent, self.friction_bend, self.friction_amplitude, self.friction_amplitude_bend
-        drag = self.drag_exponent, self.drag_bend, self.drag_amplitude, self.drag_amplitude_bend
-        terms = context.law(log_rate, log_amplitude)
+        """Logarithms of the factors of friction and drag thresholds and the drag before all parts in shares of the torque scale,
+        each like ``log_rate``: one rate or many."""
+        friction = self.friction_exponent, self.friction_amplitude, self.friction_amplitude_bend
+        drag = self.drag_exponent, self.drag_amplitude, self.drag_amplitude_bend
+        *terms, root = self.law(log_rate, log_amplitude, context)
         along, across = (sum(a * term for a, term in zip(law, terms, strict=True)) for law in (friction, drag))
-        return _bounded(along), _bounded(across)
+        before = np.maximum(self.shaft_drag * root, 0.0)
+        return _bounded(along), _bounded(across), before if np.ptp(before) > LEAST_DRAG else float(np.mean(before))
 
 
 def _bounded(growth):

@@ -21,10 +21,13 @@ from backdrive_bayes.mechanics.history import History
 from backdrive_bayes.mechanics.part import TOP, Part, apart
 
 ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95, 1.0)
-GROWING = (FRICTION, ("clearance",))
-"""Parts whose thresholds follow the rate and the amplitude: of friction, and drags."""
-GROWTH_STEP = 2e-3
-"""Step of the difference quotients by the growth of thresholds."""
+EVERY = ("compliance", "elastic", *FRICTION, "clearance", "free_play")
+GROWING = (FRICTION, ("clearance",), EVERY)
+"""Parts whose thresholds follow the rate and the amplitude: of friction, and drags; and those behind a drag at the shaft."""
+UNGROWN = (0.0, 0.0, 0.0)
+"""Growth where nothing grows."""
+GROWTH_STEPS = (2e-3, 2e-3, 2e-5)
+"""Steps of the difference quotients by the growth of the thresholds of friction and of drags, and by a drag before all parts."""
 BASELINE = ("geometric", "elastic", "friction")
 
 
@@ -50,51 +53,54 @@ class ReducerClass:
         """A part by name; its module must not be left out."""
         return next(p for p in self.parts if p.name == name)
 
-    def columns(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
+    def columns(self, history: History, growth=UNGROWN) -> dict[str, np.ndarray]:
         """Block means of every part's columns, (blocks, weights) by name.
 
-        Friction and drag thresholds are multiplied by exp(growth), either the same everywhere or (2, segments).
+        Friction and drag thresholds are multiplied by the exponentials of the first two of ``growth``, the third is the drag of a
+        play before all parts; each is either the same everywhere or (2, segments).
         """
         return {p.name: p.mix(_cells(p, growth).means(history)) for p in self.parts}
 
     def grown(self, history: History, weights, growth, part: int, terms, ends: bool = False, here=None) -> list[np.ndarray]:
         """Derivatives of the block means (blocks,) with independent ``weights``, or at the segments' ends, by the growth of
-        friction (0) or of drag (1) in the direction of each of ``terms``, one for all or (2, segments). What the parts that grow
-        make as they are may be known, ``here``."""
-        own = [(p.cells, p.weights(weights[p.name])) for p in self.parts if p.name in GROWING[part]]
+        friction (0) or of drag (1), or by the drag before all parts (2), in the direction of each of ``terms``, one for all or
+        (2, segments). What the parts that grow make as they are may be known, ``here``."""
+        own, step = [p for p in self.parts if p.name in GROWING[part]], GROWTH_STEPS[part]
 
         def response(term):
-            moved = (_response(cells.grown(growth[part] + GROWTH_STEP * term), history, w, ends) for cells, w in own)
+            grown = tuple(g + step * term if k == part else g for k, g in enumerate(growth))
+            moved = (_response(_cells(p, grown), history, p.weights(weights[p.name]), ends) for p in own)
             return sum(moved, np.zeros(()))
 
         here = response(0.0) if here is None else here
-        return [(response(term) - here) / GROWTH_STEP for term in terms]
+        return [(response(term) - here) / step for term in terms]
 
-    def ends(self, history: History, growth=(0.0, 0.0)) -> dict[str, np.ndarray]:
+    def ends(self, history: History, growth=UNGROWN) -> dict[str, np.ndarray]:
         """The same at the end of every segment."""
         return {p.name: p.mix(_cells(p, growth).ends(history)) for p in self.parts}
 
-    def along(self, history: History, weights, growth=(0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
+    def along(self, history: History, weights, growth=UNGROWN) -> tuple[np.ndarray, np.ndarray]:
         """Means on the segments and values at their ends, two of (segments,), at independent ``weights`` by part."""
         count = history.z0.size
         each = replace(history, block=np.arange(count), weight=np.ones(count), blocks=count)
         ends = (_response(_cells(p, growth), history, p.weights(weights[p.name]), True) for p in self.parts)
         return self.predict(each, weights, growth), sum(ends, np.zeros(()))
 
-    def flank_columns(self, history: History, weights, growth=(0.0, 0.0), ends: bool = False):
+    def flank_columns(self, history: History, weights, growth=UNGROWN, ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
         columns = (_response(_cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
         return np.stack(list(columns), axis=1)
 
-    def predict(self, history: History, weights, growth=(0.0, 0.0)) -> np.ndarray:
+    def predict(self, history: History, weights, growth=UNGROWN) -> np.ndarray:
         """Block means (blocks,) at independent ``weights`` by part: columns times weights without making the columns."""
         found = (_cells(p, growth).summed(history, p.weights(weights[p.name])) for p in self.parts)
         return sum(found, np.zeros(()))
 
 
 def _cells(part, growth) -> Cells:
-    grown = [growth[k] for k, names in enumerate(GROWING) if part.name in names]
-    return part.cells.grown(grown[0]) if grown else part.cells
+    *grown, before = growth
+    own = [grown[k] for k in range(len(grown)) if part.name in GROWING[k]]
+    return part.cells.grown(own[0] if own else 0.0, before)
 
 
 def _response(cells, history, weights, ends, sign=1.0):

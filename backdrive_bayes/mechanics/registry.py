@@ -14,7 +14,7 @@ from backdrive_bayes.mechanics.effects.noncongruent_loops import (
     FRICTION_AMPLITUDE,
     FRICTION_AMPLITUDE_BEND,
 )
-from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_BEND, DRAG_RATE, FRICTION_BEND, FRICTION_RATE
+from backdrive_bayes.mechanics.effects.rate_dependent_friction import DRAG_RATE, FRICTION_RATE, SHAFT_DRAG
 from backdrive_bayes.mechanics.effects.sensor_lag import LAG_SPREAD, SENSOR_LAG
 from backdrive_bayes.mechanics.effects.thermal_drift import THERMAL_DRIFT
 from backdrive_bayes.mechanics.effects.torque_offset import TORQUE_OFFSET
@@ -24,7 +24,7 @@ from backdrive_bayes.mechanics.effects.viscoelastic_creep import VISCOELASTIC_CR
 LIBRARY: dict[str, tuple[Effect, ...]] = {
     "torque_offset": (TORQUE_OFFSET,),
     "sensor_lag": (SENSOR_LAG, LAG_SPREAD),
-    "rate_dependent_friction": (FRICTION_RATE, DRAG_RATE, FRICTION_BEND, DRAG_BEND),
+    "rate_dependent_friction": (FRICTION_RATE, DRAG_RATE, SHAFT_DRAG),
     "thermal_drift": (THERMAL_DRIFT,),
     "asymmetric_stiffness": (ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS),
     "viscoelastic_creep": (VISCOELASTIC_CREEP,),

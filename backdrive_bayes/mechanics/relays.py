@@ -142,26 +142,26 @@ def ends(z1, up, down, width, fall, first):
 
 
 @numba.njit(cache=True, nogil=True)
-def surged_means(z0, z1, weight, block, blocks, up, down, width, fall, first, f0, f1, threshold, more, follows):
+def surged_means(z0, z1, weight, block, blocks, up, down, width, fall, first, f0, f1, m0, m1, threshold, more, follows):
     """Means over blocks of states whose thresholds are multiplied by a factor that runs from f0 to f1 along each segment, shape
     (cells, blocks)."""
-    out, mean, runs = np.zeros((up.size, blocks)), np.empty(z0.size), _runs(z1, f1)
+    out, mean, runs = np.zeros((up.size, blocks)), np.empty(z0.size), _runs(z1, f1, m1)
     for j in range(up.size):
         edges = up[j], down[j], width[j], fall[j]
-        _surge(mean, first[j], z0, z1, f0, f1, runs, edges, threshold[j], more[j], follows[j], False)
+        _surge(mean, first[j], z0, z1, f0, f1, m0, m1, runs, edges, threshold[j], more[j], follows[j], False)
         for i in range(z0.size):
             out[j, block[i]] += weight[i] * mean[i]
     return out
 
 
 @numba.njit(cache=True, nogil=True)
-def surged_sum(z0, z1, weight, block, blocks, up, down, width, fall, first, share, f0, f1, threshold, more, follows):
+def surged_sum(z0, z1, weight, block, blocks, up, down, width, fall, first, share, f0, f1, m0, m1, threshold, more, follows):
     """The same times the cells' shares, (blocks,)."""
-    out, mean, total, runs = np.zeros(blocks), np.empty(z0.size), np.zeros(z0.size), _runs(z1, f1)
+    out, mean, total, runs = np.zeros(blocks), np.empty(z0.size), np.zeros(z0.size), _runs(z1, f1, m1)
     for j in range(up.size):
         if share[j] != 0.0:
             edges = up[j], down[j], width[j], fall[j]
-            _surge(mean, first[j], z0, z1, f0, f1, runs, edges, threshold[j], more[j], follows[j], False)
+            _surge(mean, first[j], z0, z1, f0, f1, m0, m1, runs, edges, threshold[j], more[j], follows[j], False)
             for i in range(z0.size):
                 total[i] += share[j] * mean[i]
     for i in range(z0.size):
@@ -170,29 +170,29 @@ def surged_sum(z0, z1, weight, block, blocks, up, down, width, fall, first, shar
 
 
 @numba.njit(cache=True, nogil=True)
-def surged_ends(z0, z1, up, down, width, fall, first, f0, f1, threshold, more, follows):
+def surged_ends(z0, z1, up, down, width, fall, first, f0, f1, m0, m1, threshold, more, follows):
     """The same at the segments' ends, shape (cells, segments)."""
-    out, runs = np.empty((up.size, z0.size)), _runs(z1, f1)
+    out, runs = np.empty((up.size, z0.size)), _runs(z1, f1, m1)
     for j in range(up.size):
         edges = up[j], down[j], width[j], fall[j]
-        _surge(out[j], first[j], z0, z1, f0, f1, runs, edges, threshold[j], more[j], follows[j], True)
+        _surge(out[j], first[j], z0, z1, f0, f1, m0, m1, runs, edges, threshold[j], more[j], follows[j], True)
     return out
 
 
 @numba.njit(cache=True, nogil=True)
-def _runs(z1, f1):
-    """Lowest and highest torque, and factor, of every run of segments, (runs, 4)."""
-    out = np.empty((z1.size // RUN + 1, 4))
+def _runs(z1, f1, m1):
+    """Lowest and highest torque, and factor, and lowest drag of every run of segments, (runs, 5)."""
+    out = np.empty((z1.size // RUN + 1, 5))
     for k in range(0, z1.size, RUN):
         z, f = z1[k : k + RUN], f1[k : k + RUN]
-        out[k // RUN] = z.min(), z.max(), f.min(), f.max()
+        out[k // RUN] = z.min(), z.max(), f.min(), f.max(), m1[k : k + RUN].min()
     return out
 
 
 @numba.njit(cache=True, inline="always")
 def _rests(run, x, edges, r, more, follows):
     """Whether a state stays through a run: it does where it does at the run's least and largest factor."""
-    low, high, least, most = run
+    low, high, least, most, drag = run
     a, b, u, d = edges
     for factor in (least, most):
         g = factor - 1.0
@@ -200,23 +200,24 @@ def _rests(run, x, edges, r, more, follows):
         above, below = a + r * g + x * (u + more * g), b - r * g + x * max(d - more * g, LEAST_WIDTH * d)
         if follows:
             above, below = factor * (a + x * u), factor * (b + x * d)
-        if (x < 1.0 and high > above) or (x > 0.0 and low < below):
+        if (x < 1.0 and high > above + drag) or (x > 0.0 and low < below - drag):
             return False
     return True
 
 
 @numba.njit(cache=True, inline="always")
-def _edges(z, factor, edges, r, more, follows):
-    """Distances of a torque from the first upper and lower switching torques of a cell, and the widths of both, at a factor."""
+def _edges(z, factor, drag, edges, r, more, follows):
+    """Distances of a torque from the first upper and lower switching torques of a cell, and the widths of both, at a factor and
+    an added drag."""
     a, b, u, d = edges
     if follows:
-        return z - a * factor, z - b * factor, u * factor, d * factor
+        return z - drag - a * factor, z + drag - b * factor, u * factor, d * factor
     g = factor - 1.0
-    return z - r * g - a, z + r * g - b, max(u + more * g, LEAST_WIDTH * u), max(d - more * g, LEAST_WIDTH * d)
+    return z - drag - r * g - a, z + drag + r * g - b, max(u + more * g, LEAST_WIDTH * u), max(d - more * g, LEAST_WIDTH * d)
 
 
 @numba.njit(cache=True, nogil=True)
-def _surge(out, x, z0, z1, f0, f1, runs, edges, r, more, follows, ends):
+def _surge(out, x, z0, z1, f0, f1, m0, m1, runs, edges, r, more, follows, ends):
     """States (segments,) of one cell: the upper torque of a play rises, and its lower one falls, by what its threshold gains,
     which is ``r`` at its first relay and ``more`` than that at its last; a clearance that ``follows`` feels the torque divided by
     the factor."""
@@ -225,12 +226,12 @@ def _surge(out, x, z0, z1, f0, f1, runs, edges, r, more, follows, ends):
             out[k : k + RUN] = x
             continue
         for i in range(k, min(k + RUN, z0.size)):
-            p1, q1, u1, d1 = _edges(z1[i], f1[i], edges, r, more, follows)
+            p1, q1, u1, d1 = _edges(z1[i], f1[i], m1[i], edges, r, more, follows)
             # Resting takes no division.
             if i > 0 and (x >= 1.0 or p1 <= x * u1) and (x <= 0.0 or q1 >= x * d1):
                 out[i] = x
                 continue
-            p0, q0, u0, d0 = _edges(z0[i], f0[i], edges, r, more, follows)
+            p0, q0, u0, d0 = _edges(z0[i], f0[i], m0[i], edges, r, more, follows)
             p0, p1, q0, q1 = p0 / u0, p1 / u1, q0 / d0, q1 / d1
             if i == 0:
                 x = min(max(x, min(p0, 1.0)), max(q0, 0.0))

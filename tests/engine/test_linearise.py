@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.planted import MORE, SCALE, UNITS, by_hand, joint_mode, planted, smooth_reducer
 
+from backdrive_bayes.engine import knots as knots_module
 from backdrive_bayes.engine import linearise as engine
 from backdrive_bayes.engine import search
 from backdrive_bayes.engine.design import class_groups, class_priors
@@ -136,9 +137,9 @@ def test_knots_are_dense_where_the_loop_is_steep(clean):
 
 def test_knots_are_refined_where_the_residual_asks_for_it(monkeypatch):
     """With few knots to begin with, a steep clearance leaves a residual; refined, it does not."""
-    monkeypatch.setattr(search, "KNOTS", 8)
+    monkeypatch.setattr(knots_module, "KNOTS", 8)
     refined = mode(engagement=0.05)
-    monkeypatch.setattr(search, "_finer", lambda linear: linear.reducer)
+    monkeypatch.setattr(search, "finer", lambda linear: linear.reducer)
     coarse = mode(engagement=0.05)
     assert coarse.reducer.knots.size <= 10 + HALVINGS < refined.reducer.knots.size
     near, whole = (np.sum(np.abs(m.reducer.knots - 0.05) < 0.03) for m in (refined, coarse)), refined.reducer.knots.size
@@ -152,12 +153,12 @@ def test_where_more_is_conspicuous_than_there_is_room_for_the_worst_is_refined_f
     first = int(np.flatnonzero(clean.reduced.blocks[0].leg == 1)[20])
     worst[0][clean.reduced.blocks[0].leg > 0] = 4.0
     worst[0][first] = 9.0
-    monkeypatch.setattr(search, "MOST_KNOTS", clean.reducer.knots.size + 20)
+    monkeypatch.setattr(knots_module, "MOST_KNOTS", clean.reducer.knots.size + 20)
     monkeypatch.setattr(type(clean), "residuals", lambda self: worst)
-    refined = search._finer(clean)
+    refined = knots_module.finer(clean)
     found = refined.knots
     low, high = np.sort(np.abs(clean.reduced.blocks[0].edges_nm()[:, first]) / clean.reduced.torque_scale_nm)
-    assert clean.reducer.knots.size < found.size <= search.MOST_KNOTS
+    assert clean.reducer.knots.size < found.size <= knots_module.MOST_KNOTS
     new = np.setdiff1d(found, clean.reducer.knots)
     width = high - low
     assert np.any((new > low - width) & (new < high + width))
@@ -231,6 +232,20 @@ def test_a_law_of_the_rate_is_found_though_a_creep_may_stand_for_it():
     found = linearise(reduce_unit(planted(known=_rough_reducer(6.0), exponent=0.4)), library_terms())
     exponents = [m.distortion.friction_exponent for m in found]
     assert max(exponents) == pytest.approx(0.4, abs=0.1) and min(exponents) < 0.1
+
+
+def test_a_drag_at_the_shaft_is_found_and_is_no_lag():
+    """Both widen the loop with the rate; only behind a lag does the angle overshoot the tips (planted fault: the same width of a
+    lag, which is named one)."""
+
+    def weighed(**fault):
+        return weigh(linearise(reduce_unit(planted(loops=MORE, known=smooth_reducer(), **fault)), library_terms()))
+
+    drag, lag = weighed(drag_nm=2e-3), weighed(lag_s=0.02)
+    at = [linear.distortion.shaft_drag for linear in drag.linears]
+    assert max(at) == pytest.approx(2e-3 / drag.linears[0].reduced.torque_scale_nm, rel=0.25)
+    for found, right, wrong in ((drag, LAW, "sensor_lag"), (lag, "sensor_lag", LAW)):
+        assert found.log_factor[(right,)] > found.log_factor[(wrong,)] + 10 and found.log_factor[(right,)] > 10
 
 
 def test_friction_that_follows_the_rate_at_the_moment_is_found_in_records_of_one_mean_rate():
@@ -360,7 +375,7 @@ def test_a_damped_step_is_the_mode_beside_one_more_prior(searching):
     rows = np.concatenate([np.flatnonzero(linear.design.index == linear.design.names.index(e.name)) for e in effects])
     root, at = linear.solution.root[rows], np.array([getattr(start, e.parameter) for e in effects])
     known = np.linalg.inv(linear.solution.variance * root @ root.T)
-    units = {"offset": 1.0, "lag_s": 1.0 / free.reduced.context.rate.max()}
+    units = {"offset": 1.0, "shaft_drag": 1.0, "lag_s": 1.0 / free.reduced.context.rate.max()}
 
     def far(spread, exponents):
         prior = np.diag([(spread * units.get(e.parameter, exponents)) ** -2.0 for e in effects])
@@ -402,7 +417,7 @@ def test_one_class_has_the_knots_that_either_mode_wants(monkeypatch, searching):
     monkeypatch.setattr(search.Search, "_refined", lambda self, linear: linear)
     joint, none = engine._in_one_class(*pair, by_what_acts(free))
     assert joint.reducer is none.reducer and joint.reducer.knots.size > pair[0].reducer.knots.size + 10
-    assert np.diff(joint.reducer.knots).min() >= search._least(free.reduced)
+    assert np.diff(joint.reducer.knots).min() >= knots_module.least_distance(free.reduced)
     monkeypatch.setattr(search.Search, "widened", lambda self, linear, other: linear)
     alone = engine._in_one_class(*pair, by_what_acts(free))
     assert joint.log_marginal > alone[0].log_marginal + 20.0 and none.log_marginal > alone[1].log_marginal + 20.0
@@ -452,7 +467,7 @@ def test_a_law_that_another_search_came_upon_speaks_for_no_effect(searching):
 def test_a_search_ends_at_derivatives_of_its_own(monkeypatch):
     """From where it ended no more is found. One step away from nothing the line of the model before promises a fifth of a nat;
     where that line is never made anew (planted fault), it ends there."""
-    free = search.Search(reduce_unit(planted(4, offset_nm=-3e-4)), library_terms(), BASELINE)
+    free = search.Search(reduce_unit(planted(2, offset_nm=3e-4)), library_terms(), BASELINE)
     like = free.first(Distortion())
     ended = free.find_mode(like, Distortion())
     assert free.find_mode(like, ended.distortion).log_marginal < ended.log_marginal + 2.0

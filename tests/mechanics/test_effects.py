@@ -179,12 +179,20 @@ def test_the_lag_grows_with_the_rate_and_exponents_with_its_logarithm():
         np.testing.assert_allclose(slow, -fast, atol=0.05 * np.abs(fast).max())
 
 
-def test_a_bend_needs_three_rates_and_has_no_mean():
-    for name in ("friction_bend", "drag_bend"):
-        columns = column(name, unit())
-        np.testing.assert_allclose(sum(columns), 0.0, atol=0.05 * np.abs(columns).max())
-        core = class_groups(unit(rates=(0.2, 2.0)), REDUCER, Distortion())
-        assert tangent_groups(unit(rates=(0.2, 2.0)), REDUCER, core, Distortion(), weights(), (TERMS[name],)) == ()
+def test_a_drag_at_the_shaft_never_helps_the_motion():
+    """One that rises is none at rest, one that falls none at the largest rate, and neither is negative at a larger one."""
+    rates = CONTEXT.log_rate.max() + np.log([1e-9, 0.25, 1.0, 2.0])
+    rising, falling = (Distortion(shaft_drag=s).growth(rates, 0.0, CONTEXT)[2] for s in (0.02, -0.02))
+    np.testing.assert_allclose(rising, 0.02 * np.sqrt([0.0, 0.25, 1.0, 2.0]), atol=1e-6)
+    np.testing.assert_allclose(falling, [0.02, 0.01, 0.0, 0.0], atol=1e-6)
+
+
+def test_a_law_of_the_rate_needs_two_rates():
+    for name in ("friction_rate", "drag_rate", "shaft_drag"):
+        one = unit(rates=(0.2, 0.2))
+        core = class_groups(one, REDUCER, Distortion())
+        assert tangent_groups(one, REDUCER, core, Distortion(), weights(), (TERMS[name],)) == ()
+        assert column(name, unit(rates=(0.2, 2.0)))
 
 
 def test_what_is_unexplained_adds_to_one_on_every_leg():
@@ -212,11 +220,12 @@ def test_friction_of_the_bench_has_one_sign():
 
 
 def test_tangents_are_derivatives_of_the_prediction():
-    """Against a difference quotient ten times as wide."""
+    """Against a difference quotient ten times as wide; about no drag at the shaft, upwards."""
     for name in TANGENTS:
         term, reduced, by = TERMS[name], unit(), weights()
-        step = 0.02 if isinstance(term, GrowthEffect) else 2e-4
-        curves = [class_groups(reduced, REDUCER, Distortion(**{term.parameter: s * step})).predict(by, list(by)) for s in (1, -1)]
+        step = 0.02 if isinstance(term, GrowthEffect) and term.part < 2 else 2e-4
+        ends = (2, 0) if name == "shaft_drag" else (1, -1)
+        curves = [class_groups(reduced, REDUCER, Distortion(**{term.parameter: s * step})).predict(by, list(by)) for s in ends]
         for r, columns in enumerate(column(name, reduced)):
             quotient = (curves[0][r] - curves[1][r]) / (2 * step)
             # Both on the settled legs: from the first sample on, a shifted history begins elsewhere.

@@ -1,5 +1,6 @@
 """The class: parts, modules, knots, thresholds, and columns that are those of its cells."""
 
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,21 +89,37 @@ def test_unknown_modules_and_none_that_is_elastic_are_refused(modules):
 
 def test_thresholds_grow_each_by_its_own_logarithm():
     history = ramp(0.0, 1.0, -1.0, 1.0)
-    base, same = REDUCER.columns(history), REDUCER.columns(history, (0.0, 0.0))
+    base, same = REDUCER.columns(history), REDUCER.columns(history, (0.0, 0.0, 0.0))
     assert all(np.array_equal(base[n], same[n]) for n in base)
-    wider = REDUCER.columns(history, (0.2, 0.0))
+    wider = REDUCER.columns(history, (0.2, 0.0, 0.0))
     assert not np.allclose(wider["friction"], base["friction"])
     assert all(np.array_equal(wider[n], base[n]) for n in ("elastic", "clearance", "free_play"))
-    drag = REDUCER.columns(history, (0.0, 0.2))
+    drag = REDUCER.columns(history, (0.0, 0.2, 0.0))
     assert not np.allclose(drag["clearance"], base["clearance"]) and np.array_equal(drag["friction"], base["friction"])
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_drag_at_the_shaft_is_a_play_before_the_whole_reducer(moves):
+    """On every part; one that multiplied their thresholds would leave elasticity as it is (planted fault)."""
+    history = ramp(0.0, 1.0, -1.0, 0.3, -0.2, 1.0)
+    drag = 0.06 + 0.04 * np.sin(np.linspace(0.0, 20.0, history.z1.size + 1)) * moves
+    behind = [0.0]
+    for z, most in zip(history.z1, drag[1:], strict=True):
+        behind.append(min(max(behind[-1], z - most), z + most))
+    before = np.stack([drag[:-1], drag[1:]]) if moves else float(drag[0])
+    dragged = REDUCER.ends(history, (0.0, 0.0, before))
+    felt = REDUCER.ends(replace(history, z0=np.array(behind[:-1]), z1=np.array(behind[1:])))
+    for name, column in dragged.items():
+        np.testing.assert_allclose(column[200:], felt[name][200:], atol=1e-9, err_msg=name)
+    assert not np.allclose(dragged["elastic"], REDUCER.ends(history, (0.2, 0.2, 0.0))["elastic"], atol=1e-2)
 
 
 def test_growth_along_a_history_that_is_everywhere_the_same_is_that_growth():
     """The moving switching torques against cells that are wider once and for all; a growth that moves is another one."""
     history = ramp(0.0, 1.0, -1.0, 1.0)
-    along = [np.full((2, history.z1.size), g) for g in (0.3, -0.2)]
+    along = [np.full((2, history.z1.size), g) for g in (0.3, -0.2, 0.01)]
     for columns in (REDUCER.columns, REDUCER.ends):
-        one, other = columns(history, (0.3, -0.2)), columns(history, along)
+        one, other = columns(history, (0.3, -0.2, 0.01)), columns(history, along)
         assert all(np.allclose(one[n], other[n], atol=1e-12) for n in one)
     moving = REDUCER.columns(history, [g * np.linspace(0.0, 1.0, history.z1.size) for g in along])
     assert not np.allclose(moving["friction"], other["friction"], atol=1e-3)
@@ -111,17 +128,17 @@ def test_growth_along_a_history_that_is_everywhere_the_same_is_that_growth():
 @pytest.mark.parametrize("ends", [False, True])
 @pytest.mark.parametrize("moves", [False, True])
 def test_growth_has_its_own_derivatives(ends, moves):
-    """Against difference quotients thirty times as wide, at a growth that is not zero."""
-    history, step = ramp(0.0, 1.0, -1.0, 1.0), 0.03
+    """Against much wider difference quotients, at a growth that is not zero."""
+    history = ramp(0.0, 1.0, -1.0, 1.0)
     term = np.stack([np.linspace(-1.0, 1.5, history.z1.size)] * 2) if moves else 0.8
-    growth = (0.1 * term, -0.1 * term)
+    growth = (0.1 * term, -0.1 * term, 0.02 + 0.01 * term)
     weights = {p.name: np.ones(p.cells.count if p.mixing is None else p.mixing.shape[1]) for p in REDUCER.parts}
 
-    def angle(friction, drag):
-        columns = (REDUCER.ends if ends else REDUCER.columns)(history, (friction, drag))
+    def angle(*grown):
+        columns = (REDUCER.ends if ends else REDUCER.columns)(history, grown)
         return sum(columns[n] @ weights[n] for n in columns)
 
-    for part in (0, 1):
+    for part, step in enumerate((0.03, 0.03, 0.003)):
         (found,) = REDUCER.grown(history, weights, growth, part, [term], ends)
         more, less = (angle(*(g + sign * step * term * (k == part) for k, g in enumerate(growth))) for sign in (1, -1))
         wide = (more - less) / (2 * step)

@@ -13,7 +13,7 @@ from backdrive_bayes.engine.infer import prepare
 from backdrive_bayes.engine.periodic import WAVE
 from backdrive_bayes.engine.search import Search
 from backdrive_bayes.mechanics.friction import FRICTION
-from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.history import played, through
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.records.record import Record, Unit
 
@@ -49,18 +49,21 @@ def planted(
     lag_s=0.0,
     smooth_s=0.0,
     exponent=0.0,
+    drag_nm=0.0,
     jitter=None,
     loops=LOOPS,
     noise=NOISE,
     **options,
 ) -> Unit:
     """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque, friction
-    follows the rate over 0.05 N·m/s with ``exponent``, the angle is behind a delay or a first-order lag of ``smooth_s``."""
+    follows the rate over 0.05 N·m/s with ``exponent``, a drag at the shaft is ``drag_nm`` at 0.1 N·m/s and follows the root of
+    the rate, the angle is behind a delay or a first-order lag of ``smooth_s``."""
     known = known or physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | options))
     rng, records = np.random.default_rng(seed + 20), []
     for amplitude, rate in loops:
         time, torque = ramp(amplitude, rate, HERTZ)
-        angle = _firmer(known, (rate / 0.05) ** exponent).angle_rad(time, torque)
+        felt = played(torque[0], torque, drag_nm * np.sqrt(rate / 0.1))[1:]
+        angle = _firmer(known, (rate / 0.05) ** exponent).angle_rad(time, felt)
         if jitter:
             angle = _jittered(torque, angle, *jitter, rng)
         if smooth_s:

@@ -25,7 +25,7 @@ def _term(name, part, term):
     return AmplitudeGrowth(name, "none", "width changes with the amplitude", SOURCE, parameter=name, part=part, term=term)
 
 
-FRICTION_AMPLITUDE = _term("friction_amplitude", 0, 2)
-DRAG_AMPLITUDE = _term("drag_amplitude", 1, 2)
-FRICTION_AMPLITUDE_BEND = _term("friction_amplitude_bend", 0, 3)
-DRAG_AMPLITUDE_BEND = _term("drag_amplitude_bend", 1, 3)
+FRICTION_AMPLITUDE = _term("friction_amplitude", 0, 1)
+DRAG_AMPLITUDE = _term("drag_amplitude", 1, 1)
+FRICTION_AMPLITUDE_BEND = _term("friction_amplitude_bend", 0, 2)
+DRAG_AMPLITUDE_BEND = _term("drag_amplitude_bend", 1, 2)

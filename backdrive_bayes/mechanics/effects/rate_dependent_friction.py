@@ -1,8 +1,10 @@
-"""Friction and drag that depend on the loading rate, rising or falling, with a bend where the law has a minimum or saturates."""
+"""Friction and drag that depend on the loading rate, rising or falling: thresholds in proportion, and a drag beside them."""
 
 from backdrive_bayes.mechanics.effect import GrowthEffect
 
-SOURCE = "Stribeck's law over a narrow range of rates; Armstrong-Hélouvry et al., Automatica 30, 1994"
+BREAKS = "rate independence"
+STRIBECK = "Stribeck's law over a narrow range of rates; Armstrong-Hélouvry et al., Automatica 30, 1994"
+GREASE = "a power of the rate, for greases about its root; Herschel and Bulkley, Kolloid-Zeitschrift 39, 1926"
 
 
 class RateExponent(GrowthEffect):
@@ -13,19 +15,27 @@ class RateExponent(GrowthEffect):
         return 0.05
 
 
-class RateBend(GrowthEffect):
-    """The exponent itself changes with the rate."""
+class ShaftDrag(GrowthEffect):
+    """A drag before all parts, of seals and grease at the shaft, that rises or falls with the root of the loading rate."""
 
     def present(self, context):
-        """A third of the exponent's."""
-        return 0.015
+        """Some thousandths of the largest torque between rest and the largest rate."""
+        return 5e-3
 
 
-def _term(kind, name, signature, part, term):
-    return kind(name, "rate independence", signature, SOURCE, parameter=name.replace("rate", "exponent"), part=part, term=term)
-
-
-FRICTION_RATE = _term(RateExponent, "friction_rate", "width changes with the log of the rate, without relaxation", 0, 0)
-DRAG_RATE = _term(RateExponent, "drag_rate", "the drag of the clearance changes with the log of the rate", 1, 0)
-FRICTION_BEND = _term(RateBend, "friction_bend", "the width's law of the rate bends", 0, 1)
-DRAG_BEND = _term(RateBend, "drag_bend", "the drag's law of the rate bends", 1, 1)
+FRICTION_RATE = RateExponent(
+    "friction_rate", BREAKS, "width changes with the log of the rate, without relaxation", STRIBECK, parameter="friction_exponent"
+)
+DRAG_RATE = RateExponent(
+    "drag_rate", BREAKS, "the drag of the clearance changes with the log of the rate", STRIBECK, parameter="drag_exponent", part=1
+)
+SHAFT_DRAG = ShaftDrag(
+    "shaft_drag",
+    BREAKS,
+    "all crossing torques move apart with the root of the rate",
+    GREASE,
+    "N·m",
+    parameter="shaft_drag",
+    part=2,
+    term=3,
+)
