@@ -174,7 +174,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
 
 
 def _growth_groups(reduced, reducer, design, distortion, grown, weights, effects) -> list[Group]:
-    """Columns of growths of one part's thresholds, of those that the rates and amplitudes identify, whatever the distortion."""
+    """Columns of growths of one kind of thresholds, of those that the rates and amplitudes identify, whatever the distortion."""
 
     def laws(along):
         rates = zip(reduced.context.log_rate, along, strict=True)

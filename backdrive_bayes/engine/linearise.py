@@ -73,16 +73,16 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     reach = replace(joint.distortion, offset=starts[0].offset, lag_s=max(joint.distortion.lag_s, late))
     bent = _bent(joint, reach)
     lawless = _by_amplitude(joint, reach)
-    # Where all may act, the friction's growth may stand against a creep: alone it begins at none.
-    reach = replace(reach, friction_exponent=0.0)
-    dragged = replace(reach, drag_exponent=0.0, shaft_drag=starts[-1].shaft_drag)
+    # Where all may act, the friction's growth may stand against a creep: alone it begins at none as well.
+    steady = replace(reach, friction_exponent=0.0)
+    by_law = reach, steady, replace(steady, drag_exponent=0.0, shaft_drag=starts[-1].shaft_drag)
 
     def search(some: tuple[str, ...] | None, like: Linear) -> Search:
         fixed = (*free.fixed, *(waves if some is None or WAVE in some else ()))
         return replace(free, reduced=like.reduced, fixed=fixed, only=some)
 
     def mode(some: tuple[str, ...], like: Linear, *near: Distortion) -> Linear:
-        begun = [_only(at, some) for at in ((reach, dragged) if LAW in some else (lawless,))]
+        begun = [_only(at, some) for at in (by_law if LAW in some else (lawless,))]
         return _likeliest(search(some, like).find_mode(like, at) for at in _apart([*begun, *near], context))
 
     def possible(found: dict[tuple[str, ...], Linear]) -> dict[tuple[str, ...], Linear]:

@@ -97,7 +97,8 @@ class Posterior:
         """
         log_rate = self._log_rate(rate_nm_per_s) + history.surge
         found = np.zeros(())
-        growth = self.distortion.growth(log_rate, history.log_amplitude, self.context)
+        at = self.distortion if modules is None else replace(self.distortion, shaft_drag=0.0)
+        growth = at.growth(log_rate, history.log_amplitude, self.context)
         base = self.reducer.ends(history, growth)
         for name, columns in base.items():
             if modules is None or self.reducer.part(name).module in modules:

@@ -1,4 +1,5 @@
-"""Where to begin: torque offset, lag and the drag's dependence on rate, from where the legs cross levels of the angle."""
+"""Where to begin: torque offset, lag, the drag's dependence on the rate and a drag at the shaft that follows it, from where legs
+cross levels of the angle."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import Distortion
+from backdrive_bayes.mechanics.history import LEAST_RANGE
 
 LEVELS = np.linspace(-0.9, 0.9, 73)
 TORQUES = np.linspace(-0.97, 0.97, 1941)
@@ -21,6 +23,8 @@ NEAR, LEAST = 0.3, 0.4
 """How near to its ends, in shares of half its range, a leg still knows where it began, and the least share of it to compare."""
 USUAL = np.array([0.2, 1.0, 0.2])
 """Standard deviations by which the least squares are held: lag [torque scale a unit rate], exponent, drag [torque scale]."""
+MOST = (0.5, 0.2)
+"""Most of an exponent and of a drag, in shares of the torque scale, that a search begins at."""
 
 
 def possible_starts(reduced: Reduced) -> list[Distortion]:
@@ -40,12 +44,13 @@ def possible_starts(reduced: Reduced) -> list[Distortion]:
     design = np.column_stack([np.ones(late.size), share, at * context.log_rate[record], np.sqrt(share)])
     held = np.diag(np.r_[0.0, 1e-2 / USUAL])
     starts = []
-    for used in ([1, 0, 0, 0], [1, 1, 0, 0], [1, 0, 1, 0], [1, 1, 1, 0], [1, 0, 0, 1]):
+    several = int(np.ptp(np.sqrt(share)) > LEAST_RANGE)
+    for used in ([1, 0, 0, 0], [1, 1, 0, 0], [1, 0, 1, 0], [1, 1, 1, 0], [1, 0, 0, several]):
         found = np.linalg.lstsq(np.vstack([design * used, held]), np.r_[late, np.zeros(4)], rcond=None)[0] * used
         if found[1] < 0.0:
             continue
-        exponent = float(np.clip(found[2], -0.5, 0.5))
-        starts.append(Distortion(offset, float(found[1] / fastest), drag_exponent=exponent, shaft_drag=float(found[3])))
+        exponent, drag = (float(np.clip(value, -most, most)) for value, most in zip(found[2:], MOST, strict=True))
+        starts.append(Distortion(offset, float(found[1] / fastest), drag_exponent=exponent, shaft_drag=drag))
     return starts
 
 

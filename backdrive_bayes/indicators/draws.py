@@ -147,7 +147,7 @@ class IndicatorDraws:
         torque = loop_grid(posterior, amplitude, (self.rated_torque_nm,))
         wider = [np.log(factor) * (parameter == name) for name in ("friction_torque_Nm", "drag_torque_Nm")]
         history = settled_history(torque, rate, posterior.context.torque_scale_nm)
-        columns = posterior.reducer.ends(history, (float(wider[0]), float(wider[1])))
+        columns = posterior.reducer.ends(history, (float(wider[0]), float(wider[1]), 0.0))
         flat = replace(posterior, weights=weights).flat
         parts = {n: cut_loops(torque, flat[n] @ c.T * posterior.context.angle_scale_rad) for n, c in columns.items()}
         by_module = {m: _sum(parts, posterior.reducer, m) for m in posterior.reducer.modules}

@@ -92,20 +92,20 @@ class Cells:
     def means(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
         that differ)."""
-        along, relays = _segments(history), self._relays(history.start, history.state)
+        along, relays = _segments(history), self._relays(history)
         found = means(*along, *relays) if self.growth is None else surged_means(*along, *relays, *self._growing)
         return self._paired(found, sign)
 
     def ends(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Responses at the end of every segment, shape (segments, cells)."""
-        relays = self._relays(history.start, history.state)
+        relays = self._relays(history)
         found = ends(history.z1, *relays) if self.growth is None else surged_ends(history.z0, history.z1, *relays, *self._growing)
         return self._paired(found, sign)
 
     def summed(self, history: History, weights, sign: float = 1.0) -> np.ndarray:
         """Block means times ``weights`` (cells,), (blocks,)."""
         share = weights * self.width / self.norm
-        along = *_segments(history), *self._relays(history.start, history.state), np.concatenate([share, sign * share])
+        along = *_segments(history), *self._relays(history), np.concatenate([share, sign * share])
         found = summed(*along) if self.growth is None else surged_sum(*along, *self._growing)
         return found - 0.5 * (1.0 + sign) * float(share.sum())
 
@@ -125,10 +125,12 @@ class Cells:
         widths = np.concatenate([self.width, self.fall]), np.concatenate([self.fall, self.width])
         return up, down, *widths, np.tile(self.clearance, 2)
 
-    def _relays(self, start, state):
-        """Switching torques, widths and first states of all relays."""
-        up, down, width, fall, clearance = self._both
-        return up, down, width, fall, first_states(start, START.index(state), up, down, width, fall, clearance)
+    def _relays(self, history):
+        """Switching torques, widths and first states of all relays, which are those of the thresholds at that moment."""
+        first = self
+        if self.growth is not None:
+            first = replace(self, growth=None, drag=None).grown(float(self.growth[0, 0]), float(self.drag[0, 0]))
+        return *self._both[:4], first_states(history.start, START.index(history.state), *first._both)
 
     def _paired(self, response, sign):
         """Responses of pairs (…, cells) from those of all relays (relays, …)."""

@@ -98,7 +98,7 @@ class TangentEffect(Effect):
 
 @dataclass(frozen=True)
 class GrowthEffect(TangentEffect):
-    """An effect by which the thresholds of one part follow the rate at the moment: the derivative by a term of the law.
+    """An effect by which thresholds follow the rate at the moment: the derivative by a term of the law.
 
     ``part`` is the number of friction (0), of drag (1) or of a drag before all parts (2), ``term`` that of the exponent of the
     rate (0), of exponent and bend of the amplitude (1 and 2) or of the root of the rate (3).
@@ -139,9 +139,9 @@ class Distortion:
 
     def law(self, log_rate, log_amplitude: float, context: Context) -> tuple:
         """Derivatives of the growths by their parameters, as :meth:`Context.law`: no drag helps the motion, so that one which
-        falls with the rate is none at the largest."""
+        falls with the rate is none from the largest one on."""
         *terms, root = context.law(log_rate, log_amplitude)
-        return *terms, root - float(self.shaft_drag < 0.0)
+        return *terms, np.minimum(root - 1.0, 0.0) if self.shaft_drag < 0.0 else root
 
     def growth(self, log_rate, log_amplitude: float, context: Context) -> tuple:
         """Logarithms of the factors of friction and drag thresholds and the drag before all parts in shares of the torque scale,
@@ -150,7 +150,7 @@ class Distortion:
         drag = self.drag_exponent, self.drag_amplitude, self.drag_amplitude_bend
         *terms, root = self.law(log_rate, log_amplitude, context)
         along, across = (sum(a * term for a, term in zip(law, terms, strict=True)) for law in (friction, drag))
-        before = np.maximum(self.shaft_drag * root, 0.0)
+        before = self.shaft_drag * root
         return _bounded(along), _bounded(across), before if np.ptp(before) > LEAST_DRAG else float(np.mean(before))
 
 

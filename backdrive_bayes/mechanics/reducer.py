@@ -98,9 +98,9 @@ class ReducerClass:
 
 
 def _cells(part, growth) -> Cells:
-    *grown, before = growth
-    own = [grown[k] for k in range(len(grown)) if part.name in GROWING[k]]
-    return part.cells.grown(own[0] if own else 0.0, before)
+    friction, drag, before = growth
+    own = friction if part.name in GROWING[0] else drag if part.name in GROWING[1] else 0.0
+    return part.cells.grown(own, before)
 
 
 def _response(cells, history, weights, ends, sign=1.0):

@@ -143,8 +143,8 @@ def ends(z1, up, down, width, fall, first):
 
 @numba.njit(cache=True, nogil=True)
 def surged_means(z0, z1, weight, block, blocks, up, down, width, fall, first, f0, f1, m0, m1, threshold, more, follows):
-    """Means over blocks of states whose thresholds are multiplied by a factor that runs from f0 to f1 along each segment, shape
-    (cells, blocks)."""
+    """Means over blocks of states whose thresholds are multiplied by a factor that runs from f0 to f1 along each segment, a drag
+    from m0 to m1 added to them, shape (cells, blocks)."""
     out, mean, runs = np.zeros((up.size, blocks)), np.empty(z0.size), _runs(z1, f1, m1)
     for j in range(up.size):
         edges = up[j], down[j], width[j], fall[j]

@@ -241,10 +241,11 @@ def test_a_drag_at_the_shaft_is_found_and_is_no_lag():
     def weighed(**fault):
         return weigh(linearise(reduce_unit(planted(loops=MORE, known=smooth_reducer(), **fault)), library_terms()))
 
-    drag, lag = weighed(drag_nm=2e-3), weighed(lag_s=0.02)
-    at = [linear.distortion.shaft_drag for linear in drag.linears]
-    assert max(at) == pytest.approx(2e-3 / drag.linears[0].reduced.torque_scale_nm, rel=0.25)
-    for found, right, wrong in ((drag, LAW, "sensor_lag"), (lag, "sensor_lag", LAW)):
+    drag, falling, lag = weighed(drag_nm=2e-3), weighed(drag_nm=-2e-3), weighed(lag_s=0.02)
+    for found, planted_nm in ((drag, 2e-3), (falling, -2e-3)):
+        at = max((linear.distortion.shaft_drag for linear in found.linears), key=abs)
+        assert at == pytest.approx(planted_nm / found.linears[0].reduced.torque_scale_nm, rel=0.25)
+    for found, right, wrong in ((drag, LAW, "sensor_lag"), (falling, LAW, "sensor_lag"), (lag, "sensor_lag", LAW)):
         assert found.log_factor[(right,)] > found.log_factor[(wrong,)] + 10 and found.log_factor[(right,)] > 10
 
 
@@ -337,9 +338,9 @@ def searching():
     return free, free.learn(Distortion())
 
 
-@pytest.mark.parametrize("offset", [-5e-3, 0.0, 4e-3])
+@pytest.mark.parametrize("offset", [-6e-3, 0.0, 4e-3])
 def test_the_mode_is_reached_from_afar(searching, offset):
-    """From two to seven times the torque noise of a sample; starts hold an offset to half of it."""
+    """From three to seven times the torque noise of a sample; starts hold an offset to half of it."""
     free, like = searching
     best = free.find_mode(like, like.distortion)
     ended = free.find_mode(like, Distortion(offset=offset))
@@ -467,7 +468,7 @@ def test_a_law_that_another_search_came_upon_speaks_for_no_effect(searching):
 def test_a_search_ends_at_derivatives_of_its_own(monkeypatch):
     """From where it ended no more is found. One step away from nothing the line of the model before promises a fifth of a nat;
     where that line is never made anew (planted fault), it ends there."""
-    free = search.Search(reduce_unit(planted(2, offset_nm=3e-4)), library_terms(), BASELINE)
+    free = search.Search(reduce_unit(planted(3, offset_nm=-3e-4)), library_terms(), BASELINE)
     like = free.first(Distortion())
     ended = free.find_mode(like, Distortion())
     assert free.find_mode(like, ended.distortion).log_marginal < ended.log_marginal + 2.0

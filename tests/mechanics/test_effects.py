@@ -185,6 +185,9 @@ def test_a_drag_at_the_shaft_never_helps_the_motion():
     rising, falling = (Distortion(shaft_drag=s).growth(rates, 0.0, CONTEXT)[2] for s in (0.02, -0.02))
     np.testing.assert_allclose(rising, 0.02 * np.sqrt([0.0, 0.25, 1.0, 2.0]), atol=1e-6)
     np.testing.assert_allclose(falling, [0.02, 0.01, 0.0, 0.0], atol=1e-6)
+    for size in (0.02, -0.02):
+        here, more = (Distortion(shaft_drag=s).growth(rates, 0.0, CONTEXT)[2] for s in (size, size + 1e-6))
+        np.testing.assert_allclose((more - here) / 1e-6, Distortion(shaft_drag=size).law(rates, 0.0, CONTEXT)[-1], atol=1e-4)
 
 
 def test_a_law_of_the_rate_needs_two_rates():

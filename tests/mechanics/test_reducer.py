@@ -118,10 +118,14 @@ def test_growth_along_a_history_that_is_everywhere_the_same_is_that_growth():
     """The moving switching torques against cells that are wider once and for all; a growth that moves is another one."""
     history = ramp(0.0, 1.0, -1.0, 1.0)
     along = [np.full((2, history.z1.size), g) for g in (0.3, -0.2, 0.01)]
-    for columns in (REDUCER.columns, REDUCER.ends):
-        one, other = columns(history, (0.3, -0.2, 0.01)), columns(history, along)
-        assert all(np.allclose(one[n], other[n], atol=1e-12) for n in one)
-    moving = REDUCER.columns(history, [g * np.linspace(0.0, 1.0, history.z1.size) for g in along])
+    for state in ("neutral", "upper"):
+        # Of a record that begins at a tip, too.
+        began = replace(history, state=state) if state == "neutral" else replace(ramp(1.0, -1.0, 1.0), state=state)
+        grown = [g[:, : began.z1.size] for g in along]
+        for columns in (REDUCER.columns, REDUCER.ends):
+            one, other = columns(began, (0.3, -0.2, 0.01)), columns(began, grown)
+            assert all(np.allclose(one[n], other[n], atol=1e-12) for n in one)
+    moving, other = (REDUCER.columns(history, [g * by for g in along]) for by in (np.linspace(0.0, 1.0, history.z1.size), 1.0))
     assert not np.allclose(moving["friction"], other["friction"], atol=1e-3)
 
 

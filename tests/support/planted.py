@@ -57,12 +57,12 @@ def planted(
 ) -> Unit:
     """A unit of a reducer whose weights do not scatter; ``jitter`` is (sd, correlation length) in shares of the torque, friction
     follows the rate over 0.05 N·m/s with ``exponent``, a drag at the shaft is ``drag_nm`` at 0.1 N·m/s and follows the root of
-    the rate, the angle is behind a delay or a first-order lag of ``smooth_s``."""
+    the rate, or as much at rest and none there, the angle is behind a delay or a first-order lag of ``smooth_s``."""
     known = known or physical_reducer(np.random.default_rng(0), **({"scatter": 0.0} | options))
     rng, records = np.random.default_rng(seed + 20), []
     for amplitude, rate in loops:
         time, torque = ramp(amplitude, rate, HERTZ)
-        felt = played(torque[0], torque, drag_nm * np.sqrt(rate / 0.1))[1:]
+        felt = played(torque[0], torque, drag_nm * (np.sqrt(rate / 0.1) - (drag_nm < 0.0)))[1:]
         angle = _firmer(known, (rate / 0.05) ** exponent).angle_rad(time, felt)
         if jitter:
             angle = _jittered(torque, angle, *jitter, rng)
