@@ -74,8 +74,8 @@ def linearise(reduced: Reduced, effects: tuple[Effect, ...], modules=BASELINE) -
     bent = _bent(joint, reach)
     lawless = _by_amplitude(joint, reach)
     # Where all may act, the friction's growth may stand against a creep: alone it begins at none as well.
-    steady = replace(reach, friction_exponent=0.0)
-    by_law = reach, steady, replace(steady, drag_exponent=0.0, shaft_drag=starts[-1].shaft_drag)
+    level = replace(reach, friction_exponent=0.0)
+    by_law = reach, level, replace(level, drag_exponent=0.0, shaft_drag=starts[-1].shaft_drag)
 
     def search(some: tuple[str, ...] | None, like: Linear) -> Search:
         fixed = (*free.fixed, *(waves if some is None or WAVE in some else ()))
