@@ -24,6 +24,7 @@ from backdrive_bayes.gap.shrink import (
 )
 from backdrive_bayes.gap.simulator import Simulator
 from backdrive_bayes.gap.where import Gap
+from backdrive_bayes.mechanics.registry import all_effects
 
 PARTS = ("retuning", "effect", "left")
 DRAWS = 200
@@ -58,9 +59,10 @@ class Split:
 
     @cached_property
     def fits(self) -> tuple[Fitted, Fitted]:
-        """The unit's class with the shared effects and not a trace of those that the simulator lacks, and with these beside."""
+        """The unit's class with the shared effects and, where the simulator lacks some, not a trace of any other, which would stand
+        for them; and with these beside."""
         more = tuple(sorted({*self.shared, *self.lacking} - {"unknown"}))
-        before = _fitted(self.weighed, self.shared, self.lacking)
+        before = _fitted(self.weighed, self.shared, tuple({*all_effects()} - {*self.shared}) if self.lacking else ())
         return before, before if set(more) == set(self.shared) else _fitted(self.weighed, more)
 
     @cached_property
