@@ -59,8 +59,8 @@ class Split:
 
     @cached_property
     def fits(self) -> tuple[Fitted, Fitted]:
-        """The unit's class with the shared effects and, where the simulator lacks some, not a trace of any other, which would stand
-        for them; and with these beside."""
+        """The unit's class with the shared effects and, where the simulator lacks some, not a trace of any other, which would
+        stand for them; and with these beside."""
         more = tuple(sorted({*self.shared, *self.lacking} - {"unknown"}))
         before = _fitted(self.weighed, self.shared, tuple({*all_effects()} - {*self.shared}) if self.lacking else ())
         return before, before if set(more) == set(self.shared) else _fitted(self.weighed, more)
