@@ -11,9 +11,9 @@ import numpy as np
 from backdrive_bayes.engine.marginal import Scales
 from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.mechanics.effect import (
+    AngleEffect,
     Distortion,
     Effect,
-    FlankEffect,
     GrowthEffect,
     PathEffect,
     SpreadEffect,
@@ -143,14 +143,15 @@ def path_group(reduced: Reduced, effect: PathEffect, distortion: Distortion = UN
 
 def tangent_groups(reduced, reducer, design: Design, distortion, known, effects: tuple[Effect, ...]) -> tuple[Group, ...]:
     """Columns made of the class's prediction with its weights, and the share of a lag that smooths, out of ``known`` ones:
-    derivatives by the parameter of every tangent effect that can be told, and even counterparts."""
+    derivatives by the parameter of every tangent effect that can be told, and what follows from the angle."""
     weights = {name: known[name] for name in design.names}
     base, groups, growths = design.predict(weights), [], []
     late: list[np.ndarray] = []
     grown = grown_histories(reduced, distortion)
     for effect in effects:
-        if isinstance(effect, FlankEffect):
-            groups.append(Group(effect.name, tuple(reducer.flank_columns(h, weights, growth) for h, growth in grown)))
+        if isinstance(effect, AngleEffect):
+            turned = design.predict(weights, [p.name for p in reducer.parts])
+            groups.append(Group(effect.name, tuple(effect.columns(angle) for angle in turned)))
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
             share = float(known[effect.name][0]) if effect.name in known else 0.0

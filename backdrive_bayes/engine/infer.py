@@ -20,7 +20,7 @@ from backdrive_bayes.mechanics.registry import library_terms
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
-POWER, POWER_DOF, POWER_LEVELS = 0.5, 4.0, 16
+POWER, POWER_DOF, POWER_LEVELS = 0.7, 4.0, 16
 """Mean power of the likelihood from which weights are drawn, scales seeing all of it (a coarsened posterior: Miller and Dunson,
 JASA 114, 2019): no reducer is quite of the class, and how far it is from it is not known either. The power is therefore a
 chi-square variable of POWER_DOF degrees of freedom over that number, at POWER_LEVELS equally likely values, which makes Student's

@@ -125,11 +125,14 @@ class Search:
         A straight line promises more than there is, or less, and is trusted as far as it kept its promise; the search ends
         where it promises nothing so far. Its derivatives are those at the weights of the model before, and scales take one step
         towards their mode with each of the parameters; where a step was refused, and where nothing is promised, derivatives are
-        made anew at the model's own weights, and scales take all that are left."""
+        made anew at the model's own weights, and scales take all that are left. What is one way and wanted to act the other way
+        meanwhile is tried once more where the search would end; the likelier end counts."""
         covariances = like.covariances
         if self.reduced is not like.reduced:
             covariances = tuple(self.reduced.covariances(self.reduced.slopes(like.predicted), like.jitter))
         idle: set[str] = set()
+        again: set[str] = set()
+        ends: list[Linear] = []
 
         def about(at: Distortion, best: Linear, sweeps: int) -> Linear:
             return self._linear(like.reducer, at, covariances, best.log_scale, like.jitter, idle, best.weights, sweeps)
@@ -153,10 +156,17 @@ class Search:
                     best, own = tried, False
                     continue
             elif own:
-                break
+                # What wanted to act the other way on the way here may not any more.
+                if not (wanted := idle - again - self._backward(best)):
+                    break
+                ends.append(best)
+                again |= wanted
+                idle -= wanted
+                own = False
             if not own:
                 best, own = about(best.distortion, best, SWEEPS), True
-        return best if own else about(best.distortion, best, SWEEPS)
+        ends.append(best if own else about(best.distortion, best, SWEEPS))
+        return max(ends, key=lambda end: end.log_marginal)
 
     def _log_density(self, linear: Linear, log_scale, at: Distortion | None = None) -> float:
         """Log density of the data and a distortion, by default its own, at known log scales, up to a constant."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.gap.shrink import Fitted
-from backdrive_bayes.mechanics.effect import FlankEffect, GrowthEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import AngleEffect, GrowthEffect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
 
 POINTS = 80
@@ -63,7 +63,7 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
     growth = linear.distortion.growth(log_rate, history.log_amplitude, context)
     base = linear.reducer.ends(history, growth)
     mean = {n: weights[n] for n in base}
-    angle = sum(base[n] @ mean[n] for n in base)
+    turned = angle = sum(base[n] @ mean[n] for n in base)
     step, direction = np.abs(history.z1 - history.z0), np.sign(history.z1 - history.z0)
     slope = np.where(step > 1e-9, np.diff(angle, prepend=angle[0]) / np.maximum(step, 1e-9), 0.0)
     for effect in linear.effects:
@@ -73,8 +73,8 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
         if isinstance(effect, PathEffect):
             columns = effect.responses(history, None, context)[1]
             angle = angle + columns @ weight[: columns.shape[1]]
-        elif isinstance(effect, FlankEffect):
-            angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight
+        elif isinstance(effect, AngleEffect):
+            angle = angle + effect.columns(turned) @ weight
         elif isinstance(effect, GrowthEffect):
             term = linear.distortion.law(log_rate, history.log_amplitude, context)[effect.term]
             (by,) = linear.reducer.grown(history, mean, growth, effect.part, [term], ends=True)

@@ -8,7 +8,7 @@ from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.gap.hypotheses import Weighed
 from backdrive_bayes.gap.table import ENCODER, STICK_SLIP
 from backdrive_bayes.indicators.intervals import central
-from backdrive_bayes.mechanics.effect import PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import AngleEffect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.registry import all_effects
 
 
@@ -30,19 +30,16 @@ def effect_parameters(weighed: Weighed, properties, posterior: Posterior, effect
 
 def _of_terms(weighed, posterior, effect, level):
     rows, context = {}, posterior.context
-    for term in all_effects().get(effect, ()):
-        if term.name not in posterior.flat:
-            continue
-        weights = posterior.flat[term.name]
-        if isinstance(term, TangentEffect):
-            factor = context.torque_scale_nm if term.unit == "N·m" else 1.0
-            rows[term.parameter] = central(weights[:, 0] * factor, level) | {"unit": term.unit}
-        elif isinstance(term, PathEffect):
-            design = weighed.of(posterior.hypothesis).design
-            group = design.group(term.name)
-            # Each record has an offset of its own.
-            records = (group.of_record(r) for r in range(len(group.columns)))
-            columns = np.vstack([c - c.mean(axis=0) for c in records])
-            size = np.sqrt(np.mean((weights @ columns.T) ** 2, axis=1)) * context.angle_scale_rad
-            rows[f"{term.name}_rms"] = central(size, level) | {"unit": "rad"}
+    terms = [term for term in all_effects().get(effect, ()) if term.name in posterior.flat]
+    for term in (t for t in terms if isinstance(t, TangentEffect)):
+        factor = context.torque_scale_nm if term.unit == "N·m" else 1.0
+        rows[term.parameter] = central(posterior.flat[term.name][:, 0] * factor, level) | {"unit": term.unit}
+    if drawn := [t.name for t in terms if isinstance(t, PathEffect | AngleEffect)]:
+        design = weighed.of(posterior.hypothesis).design
+        # Each record has an offset of its own.
+        records = (np.hstack([design.group(n).of_record(r) for n in drawn]) for r in range(len(design.groups[0].columns)))
+        columns = np.vstack([c - c.mean(axis=0) for c in records])
+        weights = np.hstack([posterior.flat[n] for n in drawn])
+        size = np.sqrt(np.mean((weights @ columns.T) ** 2, axis=1)) * context.angle_scale_rad
+        rows[f"{effect}_rms"] = central(size, level) | {"unit": "rad"}
     return rows

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +17,7 @@ from backdrive_bayes.engine.log_mean import log_mean
 from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group
 from backdrive_bayes.engine.traces import trace_levels, usual_level, wave_trace
 from backdrive_bayes.engine.unlisted import bump_groups, module_group, ratchet_group, step_group, uneven_group
-from backdrive_bayes.mechanics.effect import TangentEffect
+from backdrive_bayes.mechanics.effect import Effect, TangentEffect
 from backdrive_bayes.mechanics.registry import UNKNOWN, all_effects
 
 ENCODER, STICK_SLIP, UNEXPLAINED = "encoder_error", "stick_slip", "unknown"
@@ -81,7 +83,7 @@ class Table:
         self.present = np.array([usual.get(n, 0.0) for n in self.names])
         self.known = np.array([n in effects and effects[n].known for n in self.names])
         # What these records cannot tell (one rate tells nothing of its law) has no column and is as likely as none.
-        self.terms = {n: tuple(e.name for e in terms) for n, terms in all_effects().items()} | {UNEXPLAINED: (UNEXPLAINED,)}
+        self.forms = {n: _forms(terms) for n, terms in all_effects().items()}
         one_way = [n for n, e in effects.items() if isinstance(e, TangentEffect) and e.one_way and n in self.names]
         self.one_way = {n: np.flatnonzero(self.index == self.names.index(n)).tolist() for n in one_way}
         self.jumps = jumps
@@ -122,14 +124,18 @@ class Table:
         return Row(log, leaps, None if UNEXPLAINED in hypothesis else self.left(hypothesis), self.frequency.get(hypothesis))
 
     def log_marginal(self, hypothesis) -> float:
-        """Log marginal likelihood of the contrasts under a set of names, averaged over sizes, frequencies and kinds of what is
-        unlisted. Teeth that were found scatter the block means as a process on each leg, or no more than a trace of it does."""
+        """Log marginal likelihood of the contrasts under a set of names, averaged over forms of the effects,
+        sizes, frequencies and kinds of what is unlisted. Teeth that were found scatter the block means as a process on each leg,
+        or no more than a trace of it does."""
         scattered = (set(), {UNEXPLAINED}) if STICK_SLIP in hypothesis and self.jumps.log_factor > 0.0 else (set(),)
-        listed = self._on(n for n in hypothesis if n != UNEXPLAINED)
-        found = [self._of_kinds(hypothesis, listed | more) for more in scattered]
+        chosen = itertools.product(*(self.forms.get(n, [set()]) for n in hypothesis), scattered)
+        forms = [set().union(*form) for form in chosen]
+        found = [self._of_kinds(hypothesis, form) for form in forms]
         # Beside something unlisted, the first kind is the one whose columns a fit takes.
-        on = listed | scattered[int(np.argmax(found))] | {UNEXPLAINED}.intersection(hypothesis)
+        on = forms[int(np.argmax(found))] | {UNEXPLAINED}.intersection(hypothesis)
         self.on[hypothesis] = on
+        if len(hypothesis) == 1 and UNEXPLAINED not in hypothesis:
+            self.singles[hypothesis] = max(found)
         if ENCODER in hypothesis:
             wave = self._clearest(on)
             self.frequency[hypothesis], self.price[hypothesis] = wave.frequency, wave.price
@@ -144,21 +150,15 @@ class Table:
             kinds += [self._with_one(name, on) for name in ALONE]
         return float(log_mean(kinds))
 
-    def _on(self, hypothesis) -> set:
-        return set().union(*(self.terms.get(n, ()) for n in hypothesis))
-
     def _of_terms(self, hypothesis, on) -> float:
         if ENCODER in hypothesis:
             wave = self._clearest(on)
             return self._averaged(on, wave.at, wave.columns, wave.sizes) - wave.price
         # Every bench has a trace of a wave, most likely where a wave is clearest beside one effect.
         beside = max((h for h in self.singles if set(h) <= set(hypothesis)), key=self.singles.__getitem__, default=())
-        wave = self._clearest(self._on(beside))
+        wave = self._clearest(self.on.get(beside, set()) - {UNEXPLAINED})
         without, with_trace = self._sized(on, wave.at, wave.columns, (0.0, self.trace_wave) * wave.sizes[:, None])
-        found = float(np.logaddexp(without, with_trace + wave.log_prior))
-        if len(hypothesis) == 1 and UNEXPLAINED not in hypothesis:
-            self.singles.setdefault(hypothesis, found)
-        return found
+        return float(np.logaddexp(without, with_trace + wave.log_prior))
 
     def _sized(self, on, at, columns, sizes) -> list[float]:
         """Log marginal likelihoods beside the terms ``on``, averaged over their size, for each of ``sizes`` (width, n) of further
@@ -229,6 +229,12 @@ class Table:
     def _averaged(self, on, at, columns, sizes) -> float:
         """Log marginal likelihood beside the terms ``on`` averaged over their size and over that of further columns."""
         return averaged(self._sized(on, at, columns, SIZES * sizes[..., None]))
+
+
+def _forms(terms: Iterable[Effect]) -> list[set[str]]:
+    """Names of the terms that act together, and of each that acts instead of them."""
+    together = {e.name for e in terms if not e.instead}
+    return [*([together] if together else []), *({e.name} for e in terms if e.instead)]
 
 
 def _alike(gains, frequencies) -> list[int]:

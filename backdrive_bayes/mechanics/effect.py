@@ -54,13 +54,15 @@ class Effect:
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
     channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it, ``known``
-    whether its standard deviation where it acts is not inferred.
+    whether its standard deviation where it acts is not inferred, ``instead`` whether it acts instead of the other terms
+    of its name.
     ``present`` gives the standard deviation of its (independent) weights where it acts; where it is a mere trace, as on every
     bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
 
     of_class: ClassVar[bool] = False
     known: ClassVar[bool] = False
+    instead: ClassVar[bool] = False
     name: str
     breaks: str
     signature: str
@@ -109,8 +111,12 @@ class GrowthEffect(TangentEffect):
 
 
 @dataclass(frozen=True)
-class FlankEffect(Effect):
-    """Flanks that differ: the even counterparts of the class's parts at their present weights, one column a part."""
+class AngleEffect(Effect):
+    """An effect whose columns follow from the angle that the class turns."""
+
+    def columns(self, angle) -> np.ndarray:
+        """Its columns (…, columns) at angles (…,) of the class at its present weights, in shares of the angle scale."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -483,6 +483,25 @@ def test_a_search_ends_at_derivatives_of_its_own(monkeypatch):
     assert free.find_mode(like, Distortion()).log_marginal < ended.log_marginal - 50.0
 
 
+def test_a_lag_that_wanted_to_be_early_on_the_way_is_tried_once_more(monkeypatch):
+    """Beside a drag at the shaft. A planted fault: it stays a trace for good."""
+    free = search.Search(reduce_unit(planted(1, lag_s=0.01, drag_nm=2e-3)), library_terms(), BASELINE)
+    like, right, once = free.first(Distortion()), search.Search._backward, set()
+    ended = free.find_mode(like, Distortion())
+    assert ended.distortion.lag_s > 1e-3
+    monkeypatch.setattr(search.Search, "_backward", lambda self, linear: (once.update(right(self, linear)), {*once})[1])
+    assert free.find_mode(like, Distortion()).log_marginal < ended.log_marginal - 50.0 and once == {"sensor_lag"}
+
+
+def test_the_likelier_end_of_a_search_counts(monkeypatch):
+    """Where an effect is tried once more that may end lower, if only by the wider prior of what acts."""
+    free = search.Search(reduce_unit(planted(2, offset_nm=-5e-3)), library_terms(), BASELINE)
+    like, right, once = free.first(Distortion()), search.Search._backward, set()
+    ended = free.find_mode(like, Distortion())
+    monkeypatch.setattr(search.Search, "_backward", lambda self, linear: (once.update(right(self, linear)), {*once})[1])
+    assert ended.log_marginal > free.find_mode(like, Distortion()).log_marginal - 1e-6 and once
+
+
 @pytest.mark.parametrize("options", [{"offset_nm": 8e-4}, {"lag_s": 0.03, "loops": MORE}])
 def test_a_search_ends_where_its_own_straight_line_leads_nowhere(options):
     """Of a mode without what distorts, which misfits: there the prior scales with the noise, or good steps are refused."""

@@ -120,6 +120,25 @@ def test_teeth_that_were_found_scatter_the_block_means_or_not(teeth_factor, with
     assert ("unknown" in weighed.on[("stick_slip",)]) == (expected > 2.0)
 
 
+@pytest.mark.parametrize(("whole", "instead", "expected"), [(1.0, 5.0, 4.33), (5.0, 1.0, 4.33), (3.0, 3.0, 3.0)])
+def test_flanks_differ_in_either_of_two_forms(whole, instead, expected, monkeypatch):
+    """Both are as likely before; what is left is judged beside the likelier one."""
+    weighed = table.Table(prepared("none")[0], jumps.Jumps(0.0, 0.0))
+    monkeypatch.setattr(weighed, "_of_kinds", lambda hypothesis, on: instead if "unequal_flanks" in on else whole)
+    assert weighed.log_marginal(("asymmetric_stiffness",)) == pytest.approx(expected, abs=0.01)
+    assert weighed.on[("asymmetric_stiffness",)] == ({"unequal_flanks"} if instead > whole else {"asymmetric_stiffness"})
+
+
+def test_a_flank_on_which_all_turns_further_is_asymmetric(monkeypatch):
+    """A planted fault: with elastic deflection alone, even in the torque, it looks like something unlisted."""
+    soft = changed(UNITS["none"](), lambda r, i: 0.05 * np.clip(r.angle_rad - np.mean(r.angle_rad), 0.0, None))
+    weighed = weigh(prepare(soft))
+    answers, name = gap.labels(weighed.joint()), ("asymmetric_stiffness",)
+    assert next(iter(answers)) == name[0] and weighed.log_factor[name] > weighed.log_factor[("unknown",)] + 3
+    monkeypatch.setattr(table, "_forms", lambda terms: [{t.name for t in terms if not t.instead}])
+    assert weigh(prepare(replace(soft, name="again"))).log_factor[name] < weighed.log_factor[name] - 3
+
+
 @pytest.mark.parametrize(("hertz", "size", "named"), [(50.0, 4e-4, True), (50.0, 2e-5, False)])
 def test_a_hum_in_the_samples_is_something_unlisted(hertz, size, named):
     """The means of blocks do not show it; a line no higher than any bench's resonance is not named."""

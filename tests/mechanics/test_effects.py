@@ -11,10 +11,10 @@ from support.bench import path_of
 from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
 from backdrive_bayes.mechanics import registry
 from backdrive_bayes.mechanics.effect import (
+    AngleEffect,
     Context,
     Distortion,
     Effect,
-    FlankEffect,
     GrowthEffect,
     PathEffect,
     SpreadEffect,
@@ -321,8 +321,23 @@ def test_an_effect_of_the_reducer_follows_the_torque_that_the_reducer_felt(name)
         assert np.abs(blind - here).max() > 0.01 * np.abs(here).max()
 
 
+def test_unequal_flanks_draw_what_one_flank_turns_more():
+    """In proportion, or the more the further it is turned; but no tooth alone."""
+    angle, effect = np.linspace(-1.0, 1.0, 401), TERMS["unequal_flanks"]
+    columns = effect.columns(angle)
+    np.testing.assert_allclose(effect.columns(-angle), columns)
+    size = np.abs(angle)
+
+    def left(part):
+        return np.std(part - columns @ (np.linalg.solve(columns.T @ columns + 1e-6 * np.eye(columns.shape[1]), columns.T @ part)))
+
+    assert left(0.5 * size) < 0.02 * np.std(0.5 * size) and left(0.5 * size**1.5) < 0.02 * np.std(0.5 * size**1.5)
+    tooth = np.exp(-0.5 * ((size - 0.5) / 0.05) ** 2)
+    assert left(tooth) > 0.5 * np.std(tooth)
+
+
 def test_every_term_is_of_one_known_kind():
-    assert all(isinstance(t, PathEffect | TangentEffect | FlankEffect | SpreadEffect) for t in TERMS.values())
+    assert all(isinstance(t, PathEffect | TangentEffect | AngleEffect | SpreadEffect) for t in TERMS.values())
     assert all(t.of_reducer is False for n, t in TERMS.items() if n in ("torque_offset", "sensor_lag", "thermal_drift"))
 
 
