@@ -150,8 +150,7 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
     grown = grown_histories(reduced, distortion)
     for effect in effects:
         if isinstance(effect, AngleEffect):
-            turned = design.predict(weights, [p.name for p in reducer.parts])
-            groups.append(Group(effect.name, tuple(effect.columns(angle) for angle in turned)))
+            groups.append(Group(effect.name, tuple(effect.columns(angle) for angle in base)))
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
             share = float(known[effect.name][0]) if effect.name in known else 0.0

@@ -7,7 +7,7 @@ import numpy as np
 from backdrive_bayes.engine.covariance import whitener
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.reduced import BlockMeans, Jitter
-from backdrive_bayes.mechanics.effect import PathEffect
+from backdrive_bayes.mechanics.effect import AngleEffect, PathEffect
 from backdrive_bayes.mechanics.history import of_blocks
 
 REPLICATES_A_CHAIN = 50
@@ -54,9 +54,12 @@ def _departures(posterior: Posterior, record: int) -> np.ndarray:
     history = of_blocks(blocks, context.torque_scale_nm, distortion.offset, distortion.lag_s)
     shared = (history, distortion.growth(context.log_rate[record] + history.surge, history.log_amplitude, context))
     columns = posterior.reducer.columns(*shared)
-    for effect in posterior.effects:
-        if isinstance(effect, PathEffect) and effect.name in posterior.flat:
+    turned = sum(c @ posterior.flat[n].mean(axis=0) for n, c in columns.items())
+    for effect in (e for e in posterior.effects if e.name in posterior.flat):
+        if isinstance(effect, PathEffect):
             columns[effect.name] = history.mean(*effect.responses(history, record, context))
+        elif isinstance(effect, AngleEffect):
+            columns[effect.name] = effect.columns(turned)
     per_record = {e.name for e in posterior.effects if e.per_record}
     found = np.zeros(())
     for name, column in columns.items():

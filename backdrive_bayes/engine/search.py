@@ -229,7 +229,7 @@ class Search:
         return effect in {t for n, terms in all_effects().items() if n in self.only or n not in still for t in terms}
 
     def _backward(self, linear) -> set[str]:
-        """Effects that are one way and want to act the other way: they stay traces from then on."""
+        """Effects that are one way and want to act the other way."""
         found = (e for e in self.effects if isinstance(e, TangentEffect) and e.one_way and e.name in linear.weights)
         return {e.name for e in found if linear.weights[e.name][0] < 0.0}
 

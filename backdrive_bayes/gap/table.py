@@ -135,7 +135,7 @@ class Table:
         on = forms[int(np.argmax(found))] | {UNEXPLAINED}.intersection(hypothesis)
         self.on[hypothesis] = on
         if len(hypothesis) == 1 and UNEXPLAINED not in hypothesis:
-            self.singles[hypothesis] = max(found)
+            self.singles[hypothesis] = max(f for f, form in zip(found, forms, strict=True) if UNEXPLAINED not in form)
         if ENCODER in hypothesis:
             wave = self._clearest(on)
             self.frequency[hypothesis], self.price[hypothesis] = wave.frequency, wave.price

@@ -54,8 +54,8 @@ class Effect:
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
     channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it, ``known``
-    whether its standard deviation where it acts is not inferred, ``instead`` whether it acts instead of the other terms
-    of its name.
+    whether its standard deviation where it acts is not inferred, ``instead`` whether it is weighed
+    instead of the other terms of its name (a fit lets all of them act).
     ``present`` gives the standard deviation of its (independent) weights where it acts; where it is a mere trace, as on every
     bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
@@ -112,7 +112,7 @@ class GrowthEffect(TangentEffect):
 
 @dataclass(frozen=True)
 class AngleEffect(Effect):
-    """An effect whose columns follow from the angle that the class turns."""
+    """An effect whose columns follow from the angle that the class turns, the same in all records."""
 
     def columns(self, angle) -> np.ndarray:
         """Its columns (…, columns) at angles (…,) of the class at its present weights, in shares of the angle scale."""

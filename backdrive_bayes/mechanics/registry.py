@@ -38,7 +38,8 @@ def all_effects() -> dict[str, tuple[Effect, ...]]:
     found = dict(LIBRARY)
     for point in entry_points(group="backdrive_bayes.effects"):
         effect = point.load()
-        found[effect.name] = effect if isinstance(effect, tuple) else (effect,)
+        terms = effect if isinstance(effect, tuple) else (effect,)
+        found[terms[0].name] = terms
     return found
 
 

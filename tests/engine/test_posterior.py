@@ -7,20 +7,22 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 from scipy.stats import t as student
-from support.planted import joint_mode, planted
+from support.planted import joint_mode, planted, prepared
 
 from backdrive_bayes.bench.known_truth import BenchNoise, random_reducer, simulate_unit
 from backdrive_bayes.engine import infer as module
-from backdrive_bayes.engine import proposal, sample
+from backdrive_bayes.engine import predictive, proposal, sample
 from backdrive_bayes.engine.infer import infer
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.indicators.draws import IndicatorDraws, core_indicators
 from backdrive_bayes.indicators.loop import cut_loops, settled_history
+from backdrive_bayes.mechanics.effect import PathEffect
 from backdrive_bayes.mechanics.registry import library_terms
 from backdrive_bayes.records.record import Unit
 
 UNITS, LEVEL, AMPLITUDE, RATE, K = 40, 0.9, 0.1, 0.1, 0.03
 NAMES = ("lost_motion_rad", "loop_area_J", "dissipation_ratio", "peak_angle_rad")
+OF_PATH = {term.name for term in library_terms() if isinstance(term, PathEffect)}
 WIDER = student.ppf(0.95, module.POWER_DOF) / np.sqrt(module.POWER) / norm.ppf(0.95)
 """Width of 90 % intervals at the package's powers over that at the whole likelihood."""
 LEAST, MOST = binom.interval(0.99, UNITS, LEVEL)
@@ -31,6 +33,11 @@ def fitted(unit: Unit, effects=(), seed=0, powers=module.POWERS):
 
     The reducers are of the class, but not drawn from its prior; for those that are see studies/class_sbc.py.
     """
+    return fitted_by(joint_mode(reduce_unit(unit, 30), effects), (), seed, powers)
+
+
+def fitted_by(linear, hypothesis, seed=0, powers=module.POWERS):
+    """The same about a mode."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "POWERS", powers)
         for room, name, value in (
@@ -41,7 +48,7 @@ def fitted(unit: Unit, effects=(), seed=0, powers=module.POWERS):
             (proposal, "EFFICIENT", 0.0),
         ):
             patch.setattr(room, name, value)
-        return infer(joint_mode(reduce_unit(unit, 30), effects), (), seed)
+        return infer(linear, hypothesis, seed)
 
 
 def truth_of(known, torque):
@@ -124,3 +131,15 @@ def test_one_seed_gives_the_same_bytes():
     assert all(first.weights[n].tobytes() == again.weights[n].tobytes() for n in first.weights)
     assert any(first.weights[n].tobytes() != other.weights[n].tobytes() for n in first.weights)
     assert first.convergence.evaluations == again.convergence.evaluations
+
+
+def test_draws_depart_from_their_mean_by_all_that_a_record_sees_of_the_reducer():
+    """As the columns of the model say that was sampled; forms of one effect stand against each other."""
+    linear = prepared("asymmetric_stiffness")[0]
+    posterior = fitted_by(linear, ("asymmetric_stiffness",))
+    drawn = [n for n in linear.design.names if n in {p.name for p in linear.reducer.parts} | OF_PATH | {"unequal_flanks"}]
+    away = {n: posterior.flat[n] - posterior.flat[n].mean(axis=0) for n in drawn}
+    by_name = {n: away[n] @ linear.design.group(n).of_record(1).T * posterior.context.angle_scale_rad for n in drawn}
+    right, found = sum(by_name.values()), predictive._departures(posterior, 1)
+    assert np.std(found - right) < 0.02 * np.std(right)
+    assert np.std(right - by_name["unequal_flanks"]) > 1.1 * np.std(right)

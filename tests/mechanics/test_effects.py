@@ -358,17 +358,18 @@ class Mine(PathEffect):
         return history.z0[:, None] ** 2, history.z1[:, None] ** 2
 
 
-def test_an_effect_of_ones_own_comes_by_entry_point(monkeypatch, fresh_registry):
-    mine = Mine("mine", "oddness", "even", "nobody", "rad")
+@pytest.mark.parametrize("terms", [1, 2])
+def test_an_effect_of_ones_own_comes_by_entry_point(terms, monkeypatch, fresh_registry):
+    mine = tuple(Mine(name, "oddness", "even", "nobody", "rad") for name in ("mine", "more")[:terms])
     asked = []
 
     def points(group):
         asked.append(group)
-        return [SimpleNamespace(load=lambda: mine)]
+        return [SimpleNamespace(load=lambda: mine if terms > 1 else mine[0])]
 
     monkeypatch.setattr(registry, "entry_points", points)
     found = registry.all_effects()
-    assert found["mine"] == (mine,) and asked == ["backdrive_bayes.effects"] and set(registry.LIBRARY) < set(found)
+    assert found["mine"] == mine and asked == ["backdrive_bayes.effects"] and set(registry.LIBRARY) < set(found)
     assert path_group(unit(), found["mine"][0]).columns[0].shape == (90, 1)
 
 

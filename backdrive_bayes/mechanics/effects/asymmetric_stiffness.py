@@ -9,7 +9,8 @@ NODES = np.array([0.0, 0.01, 0.03, 0.08, 0.16, 0.28, 0.45, 0.65, 0.85, 1.2])
 BEHIND = (0.0, 0.02, 0.08, 0.3)
 """Thresholds of friction through which the even part may see the torque."""
 SMOOTH = 1.5
-"""Length over which the even slope changes with the root of the torque: stiffness bends over the whole range, damage does not."""
+"""Length over which the even slope changes with the root of the torque or the angle: stiffness bends over the whole range, damage
+does not."""
 USUAL = 0.02
 """Usual size, in shares of the angle scale."""
 
