@@ -14,6 +14,7 @@ from backdrive_bayes.mechanics.effect import (
     AngleEffect,
     Distortion,
     Effect,
+    FlankEffect,
     GrowthEffect,
     PathEffect,
     SpreadEffect,
@@ -151,6 +152,8 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
     for effect in effects:
         if isinstance(effect, AngleEffect):
             groups.append(Group(effect.name, tuple(effect.columns(angle) for angle in base)))
+        if isinstance(effect, FlankEffect):
+            groups.append(Group(effect.name, tuple(reducer.flank_columns(h, weights, growth) for h, growth in grown)))
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
             share = float(known[effect.name][0]) if effect.name in known else 0.0

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from backdrive_bayes.engine.diagnostics import Convergence
-from backdrive_bayes.mechanics.effect import AngleEffect, Context, Distortion, Effect, GrowthEffect, PathEffect
+from backdrive_bayes.mechanics.effect import AngleEffect, Context, Distortion, Effect, FlankEffect, GrowthEffect, PathEffect
 from backdrive_bayes.mechanics.history import History, through
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
@@ -115,6 +115,9 @@ class Posterior:
                 continue
             if isinstance(effect, PathEffect):
                 found = found + self.flat[effect.name] @ effect.responses(history, None, self.context)[1].T
+            elif isinstance(effect, FlankEffect):
+                even = self.reducer.flank_columns(history, mean, growth, ends=True)
+                found = found + self.flat[effect.name] @ even.T
             elif isinstance(effect, AngleEffect):
                 turned = sum(base[n] @ mean[n] for n in base)
                 found = found + self.flat[effect.name] @ effect.columns(turned).T

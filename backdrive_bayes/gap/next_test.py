@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.gap.shrink import Fitted
-from backdrive_bayes.mechanics.effect import AngleEffect, GrowthEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import AngleEffect, FlankEffect, GrowthEffect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
 
 POINTS = 80
@@ -73,6 +73,8 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
         if isinstance(effect, PathEffect):
             columns = effect.responses(history, None, context)[1]
             angle = angle + columns @ weight[: columns.shape[1]]
+        elif isinstance(effect, FlankEffect):
+            angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight
         elif isinstance(effect, AngleEffect):
             angle = angle + effect.columns(turned) @ weight
         elif isinstance(effect, GrowthEffect):

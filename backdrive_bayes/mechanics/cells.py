@@ -89,24 +89,25 @@ class Cells:
         """Threshold of the first relay, and by how much that of the last one is larger."""
         return 0.5 * (self.up - self.down), 0.5 * (self.width - self.fall)
 
-    def means(self, history: History) -> np.ndarray:
-        """Block means of the responses, shape (blocks, cells)."""
+    def means(self, history: History, sign: float = 1.0) -> np.ndarray:
+        """Block means of the responses, shape (blocks, cells); with ``sign`` -1 of their even counterparts (flanks
+        that differ)."""
         along, relays = _segments(history), self._relays(history)
         found = means(*along, *relays) if self.growth is None else surged_means(*along, *relays, *self._growing)
-        return self._paired(found)
+        return self._paired(found, sign)
 
-    def ends(self, history: History) -> np.ndarray:
+    def ends(self, history: History, sign: float = 1.0) -> np.ndarray:
         """Responses at the end of every segment, shape (segments, cells)."""
         relays = self._relays(history)
         found = ends(history.z1, *relays) if self.growth is None else surged_ends(history.z0, history.z1, *relays, *self._growing)
-        return self._paired(found)
+        return self._paired(found, sign)
 
-    def summed(self, history: History, weights) -> np.ndarray:
+    def summed(self, history: History, weights, sign: float = 1.0) -> np.ndarray:
         """Block means times ``weights`` (cells,), (blocks,)."""
         share = weights * self.width / self.norm
-        along = *_segments(history), *self._relays(history), np.concatenate([share, share])
+        along = *_segments(history), *self._relays(history), np.concatenate([share, sign * share])
         found = summed(*along) if self.growth is None else surged_sum(*along, *self._growing)
-        return found - float(share.sum())
+        return found - 0.5 * (1.0 + sign) * float(share.sum())
 
     @cached_property
     def _growing(self):
@@ -131,10 +132,10 @@ class Cells:
             first = replace(self, growth=None, drag=None).grown(float(self.growth[0, 0]), float(self.drag[0, 0]))
         return *self._both[:4], first_states(history.start, START.index(history.state), *first._both)
 
-    def _paired(self, response):
+    def _paired(self, response, sign):
         """Responses of pairs (…, cells) from those of all relays (relays, …)."""
         one, other = response[: self.count], response[self.count :]
-        return ((one + other - 1.0) * (self.width / self.norm)[:, None]).T
+        return ((one + sign * other - 0.5 * (1.0 + sign)) * (self.width / self.norm)[:, None]).T
 
 
 def _segments(history):

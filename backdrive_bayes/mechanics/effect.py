@@ -54,8 +54,8 @@ class Effect:
 
     ``breaks`` is the symmetry of the class that it breaks, ``of_reducer`` is False for faults of the measuring
     channel, ``per_record`` says whether each record has weights of its own, ``of_class`` whether every reducer has it, ``known``
-    whether its standard deviation where it acts is not inferred, ``instead`` whether it is weighed
-    instead of the other terms of its name (a fit lets all of them act).
+    whether its standard deviation where it acts is not inferred, ``instead`` whether it is weighed in place of the other terms of
+    its name, about modes that are searched without it (a fit lets all of them act).
     ``present`` gives the standard deviation of its (independent) weights where it acts; where it is a mere trace, as on every
     bench, the noise decides (:mod:`backdrive_bayes.engine.traces`).
     """
@@ -117,6 +117,11 @@ class AngleEffect(Effect):
     def columns(self, angle) -> np.ndarray:
         """Its columns (…, columns) at angles (…,) of the class at its present weights, in shares of the angle scale."""
         raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class FlankEffect(Effect):
+    """Flanks that differ: the even counterparts of the class's parts at their present weights, one column a part."""
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,11 @@ class ReducerClass:
         ends = (_response(_cells(p, growth), history, p.weights(weights[p.name]), True) for p in self.parts)
         return self.predict(each, weights, growth), sum(ends, np.zeros(()))
 
+    def flank_columns(self, history: History, weights, growth=UNGROWN, ends: bool = False):
+        """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
+        columns = (_response(_cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
+        return np.stack(list(columns), axis=1)
+
     def predict(self, history: History, weights, growth=UNGROWN) -> np.ndarray:
         """Block means (blocks,) at independent ``weights`` by part: columns times weights without making the columns."""
         found = (_cells(p, growth).summed(history, p.weights(weights[p.name])) for p in self.parts)
@@ -98,9 +103,9 @@ def _cells(part, growth) -> Cells:
     return part.cells.grown(own, before)
 
 
-def _response(cells, history, weights, ends):
+def _response(cells, history, weights, ends, sign=1.0):
     """Sum of the cells' responses times ``weights`` (cells,), block means or at the segments' ends."""
-    return cells.ends(history) @ weights if ends else cells.summed(history, weights)
+    return cells.ends(history, sign=sign) @ weights if ends else cells.summed(history, weights, sign=sign)
 
 
 def _compliance() -> Part:

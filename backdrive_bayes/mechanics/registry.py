@@ -6,7 +6,7 @@ from functools import lru_cache
 from importlib.metadata import entry_points
 
 from backdrive_bayes.mechanics.effect import Effect
-from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS
+from backdrive_bayes.mechanics.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS, UNEQUAL_DEFLECTION, UNEQUAL_FLANKS
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.effects.noncongruent_loops import (
     DRAG_AMPLITUDE,
@@ -26,7 +26,7 @@ LIBRARY: dict[str, tuple[Effect, ...]] = {
     "sensor_lag": (SENSOR_LAG, LAG_SPREAD),
     "rate_dependent_friction": (FRICTION_RATE, DRAG_RATE, SHAFT_DRAG),
     "thermal_drift": (THERMAL_DRIFT,),
-    "asymmetric_stiffness": (ASYMMETRIC_STIFFNESS, UNEQUAL_FLANKS),
+    "asymmetric_stiffness": (ASYMMETRIC_STIFFNESS, UNEQUAL_DEFLECTION),
     "viscoelastic_creep": (VISCOELASTIC_CREEP,),
 }
 """Effects by the name that an answer gives them, each with the terms that it consists of."""
@@ -47,6 +47,9 @@ UNKNOWN = UNEXPLAINED
 """The process that stands for what no listed effect explains."""
 BENCH = (BENCH_HYSTERESIS,)
 """What every bench has at trace level and no diagnosis can name."""
+FLANKS = (UNEQUAL_FLANKS,)
+"""What every reducer has at trace level and no diagnosis can name: the parts of two flanks are not quite alike. While modes are
+searched it may be more, or the class is bent by what breaks its symmetry."""
 NONCONGRUENT = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE, FRICTION_AMPLITUDE_BEND, DRAG_AMPLITUDE_BEND)
 """What every reducer has at trace level beside the operator: loops of other amplitudes are not quite congruent."""
 OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
@@ -55,4 +58,4 @@ OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
 
 def library_terms() -> tuple[Effect, ...]:
     """Every term of every listed effect, what every bench has and what every reducer has."""
-    return (*(term for terms in all_effects().values() for term in terms), *BENCH, *NONCONGRUENT)
+    return (*(term for terms in all_effects().values() for term in terms), *BENCH, *FLANKS, *NONCONGRUENT)

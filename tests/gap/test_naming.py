@@ -124,9 +124,9 @@ def test_teeth_that_were_found_scatter_the_block_means_or_not(teeth_factor, with
 def test_flanks_differ_in_either_of_two_forms(whole, instead, expected, monkeypatch):
     """Both are as likely before; what is left is judged beside the likelier one."""
     weighed = table.Table(prepared("none")[0], jumps.Jumps(0.0, 0.0))
-    monkeypatch.setattr(weighed, "_of_kinds", lambda hypothesis, on: instead if "unequal_flanks" in on else whole)
+    monkeypatch.setattr(weighed, "_of_kinds", lambda hypothesis, on: instead if "unequal_deflection" in on else whole)
     assert weighed.log_marginal(("asymmetric_stiffness",)) == pytest.approx(expected, abs=0.01)
-    assert weighed.on[("asymmetric_stiffness",)] == ({"unequal_flanks"} if instead > whole else {"asymmetric_stiffness"})
+    assert weighed.on[("asymmetric_stiffness",)] == ({"unequal_deflection"} if instead > whole else {"asymmetric_stiffness"})
 
 
 def test_a_flank_on_which_all_turns_further_is_asymmetric(monkeypatch):

@@ -101,12 +101,13 @@ def test_blocks_gather_their_segments_by_weight():
 
 @settings(max_examples=60, deadline=None)
 @given(TORQUES, st.sampled_from(START))
-def test_the_response_is_odd(turning, state):
+def test_the_response_is_odd_and_its_counterpart_even(turning, state):
     torque = np.array(turning)
     swapped = {"upper": "lower", "lower": "upper", "neutral": "neutral"}[state]
     here, there = along(torque, state=state), along(-torque, state=swapped)
-    for method in (MANY.means, MANY.ends):
-        np.testing.assert_allclose(method(there), -method(here), atol=1e-12)
+    for sign in (1.0, -1.0):
+        for method in (MANY.means, MANY.ends):
+            np.testing.assert_allclose(method(there, sign), -sign * method(here, sign), atol=1e-12)
 
 
 @settings(max_examples=60, deadline=None)

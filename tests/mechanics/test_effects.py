@@ -15,6 +15,7 @@ from backdrive_bayes.mechanics.effect import (
     Context,
     Distortion,
     Effect,
+    FlankEffect,
     GrowthEffect,
     PathEffect,
     SpreadEffect,
@@ -28,7 +29,8 @@ from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.records.reduction import Blocks
 
-TERMS = {t.name: t for terms in registry.LIBRARY.values() for t in terms} | {registry.UNKNOWN.name: registry.UNKNOWN}
+LISTED = (*registry.LIBRARY.values(), registry.FLANKS, (registry.UNKNOWN,))
+TERMS = {t.name: t for terms in LISTED for t in terms}
 PATHS = [n for n, t in TERMS.items() if isinstance(t, PathEffect)]
 TANGENTS = [n for n, t in TERMS.items() if isinstance(t, TangentEffect)]
 RATES = (0.2, 1.0, 2.0)
@@ -84,7 +86,7 @@ def column(name, reduced, distortion=None):
 
 def tangents(reduced, distortion, known, name):
     """Columns by record of every tangent term that belongs with one, by name."""
-    terms = next(terms for terms in registry.LIBRARY.values() if TERMS[name] in terms)
+    terms = next(terms for terms in LISTED if TERMS[name] in terms)
     core = class_groups(reduced, REDUCER, distortion)
     return {g.name: g.columns for g in tangent_groups(reduced, REDUCER, core, distortion, known, terms)}
 
@@ -321,9 +323,9 @@ def test_an_effect_of_the_reducer_follows_the_torque_that_the_reducer_felt(name)
         assert np.abs(blind - here).max() > 0.01 * np.abs(here).max()
 
 
-def test_unequal_flanks_draw_what_one_flank_turns_more():
+def test_unequal_deflection_draws_what_one_flank_turns_more():
     """In proportion, or the more the further it is turned; but no tooth alone."""
-    angle, effect = np.linspace(-1.0, 1.0, 401), TERMS["unequal_flanks"]
+    angle, effect = np.linspace(-1.0, 1.0, 401), TERMS["unequal_deflection"]
     columns = effect.columns(angle)
     np.testing.assert_allclose(effect.columns(-angle), columns)
     size = np.abs(angle)
@@ -337,7 +339,7 @@ def test_unequal_flanks_draw_what_one_flank_turns_more():
 
 
 def test_every_term_is_of_one_known_kind():
-    assert all(isinstance(t, PathEffect | TangentEffect | AngleEffect | SpreadEffect) for t in TERMS.values())
+    assert all(isinstance(t, PathEffect | TangentEffect | FlankEffect | AngleEffect | SpreadEffect) for t in TERMS.values())
     assert all(t.of_reducer is False for n, t in TERMS.items() if n in ("torque_offset", "sensor_lag", "thermal_drift"))
 
 

@@ -207,6 +207,15 @@ def test_growth_of_a_flank_along_a_history_is_that_of_all_its_thresholds(growth)
     np.testing.assert_allclose(along.means(history), cells.grown(growth).means(history), atol=1e-12)
 
 
+def test_flanks_that_differ_are_even_in_the_torque():
+    rng = np.random.default_rng(1)
+    weights = {n: rng.standard_normal(c.shape[1]) for n, c in REDUCER.columns(ramp(0.0, 1.0)).items()}
+    here, there = (REDUCER.flank_columns(ramp(0.0, s, -s, s), weights) for s in (1.0, -1.0))
+    np.testing.assert_allclose(there, here, atol=1e-10)
+    ends = REDUCER.flank_columns(ramp(0.0, 1.0), weights, ends=True)
+    assert ends.shape == (199, len(REDUCER.parts)) and np.abs(here).max() > 0.01
+
+
 def test_knots_are_dense_where_blocks_are_and_keep_their_distance():
     torques = np.r_[np.linspace(-1, 1, 50), np.linspace(0.04, 0.06, 200)]
     knots = place_knots(torques, 60, 1e-4)

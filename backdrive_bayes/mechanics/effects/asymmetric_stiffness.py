@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from backdrive_bayes.mechanics.effect import AngleEffect, PathEffect
+from backdrive_bayes.mechanics.effect import AngleEffect, FlankEffect, PathEffect
 from backdrive_bayes.mechanics.history import played
 
 NODES = np.array([0.0, 0.01, 0.03, 0.08, 0.16, 0.28, 0.45, 0.65, 0.85, 1.2])
@@ -45,7 +45,7 @@ ASYMMETRIC_STIFFNESS = AsymmetricStiffness(
 )
 
 
-class UnequalFlanks(AngleEffect):
+class UnequalDeflection(AngleEffect):
     """All that one flank turns, its clearance and its friction too, is larger than what the other does: an angle that is even in
     the angle which both turn alike, smooth in the root of its size."""
 
@@ -60,4 +60,15 @@ class UnequalFlanks(AngleEffect):
         return even(angle)
 
 
-UNEQUAL_FLANKS = UnequalFlanks("unequal_flanks", "oddness", "even in the angle", "as for the stiffness", "rad")
+UNEQUAL_DEFLECTION = UnequalDeflection("unequal_deflection", "oddness", "even in the angle", "as for the stiffness", "rad")
+
+
+class UnequalFlanks(FlankEffect):
+    """Elasticity, friction and clearance each differ between the flanks by a share of themselves."""
+
+    def present(self, context):
+        """Five per cent."""
+        return 0.05
+
+
+UNEQUAL_FLANKS = UnequalFlanks("unequal_flanks", "oddness", "even in the torque, with hysteresis", "as for the stiffness", "1")
