@@ -66,7 +66,7 @@ exact 0.57, strong 0.50, none 0.96, unlisted 0.31, listed for unlisted 0.31, pai
 unlisted kinds are nearer to listed effects, its clean reducers have more than one clearance, and of the friction that depends
 on the rate none of four units is named. Teeth of stick-slip are looked for only while the torque moves since, with two of its
 units in view, the law of the rate has a drag at the shaft, with four in view, and flanks differ in all that they turn, with
-five in view: its scores below are of the present code, those of the eleventh of the code before these three."""
+five in view; units of the eleventh were in view of both. The scores below are of the present code."""
 HANDS = {"foreign": "foreign", "contact": "own", "mujoco": "own", "ode": "own", "sliders": "own"}
 """Whose hand a bench is of; all others are outside benches, of which the hands are alike."""
 SET = [f.name for f in fields(Calibration) if f.name != "cover"]
