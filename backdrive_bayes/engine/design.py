@@ -134,6 +134,17 @@ def class_priors(reducer: ReducerClass) -> dict[str, tuple[float, float]]:
     return {p.name: p.log_scale for p in reducer.parts}
 
 
+def effect_columns(effect, reducer, history: History, weights, growth, turned, context, record=None, ends=False):
+    """Columns of an effect along a history, (blocks, columns) or at the segments' ends; None of one that moves a parameter. The
+    class turns by ``turned`` at the ``weights`` of its parts; ``record`` is as for :meth:`PathEffect.responses`."""
+    if isinstance(effect, PathEffect):
+        responses = effect.responses(history, record, context)
+        return responses[1] if ends else history.mean(*responses)
+    if isinstance(effect, FlankEffect):
+        return reducer.flank_columns(history, weights, growth, ends)
+    return effect.columns(turned) if isinstance(effect, AngleEffect) else None
+
+
 def path_group(reduced: Reduced, effect: PathEffect, distortion: Distortion = UNDISTORTED) -> Group:
     """Columns of an effect that follows from the torque history, as the reducer felt it; its prior scale is its own."""
     columns = []
@@ -150,10 +161,10 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
     late: list[np.ndarray] = []
     grown = grown_histories(reduced, distortion)
     for effect in effects:
-        if isinstance(effect, AngleEffect):
-            groups.append(Group(effect.name, tuple(effect.columns(angle) for angle in base)))
-        if isinstance(effect, FlankEffect):
-            groups.append(Group(effect.name, tuple(reducer.flank_columns(h, weights, growth) for h, growth in grown)))
+        if isinstance(effect, AngleEffect | FlankEffect):
+            each = zip(grown, base, strict=True)
+            columns = (effect_columns(effect, reducer, h, weights, growth, by, reduced.context) for (h, growth), by in each)
+            groups.append(Group(effect.name, tuple(columns)))
         if isinstance(effect, SpreadEffect):
             smoothed, growth = _smoothing(reduced, reducer, distortion, weights, base, late)
             share = float(known[effect.name][0]) if effect.name in known else 0.0

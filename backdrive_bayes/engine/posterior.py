@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.engine.diagnostics import Convergence
-from backdrive_bayes.mechanics.effect import AngleEffect, Context, Distortion, Effect, FlankEffect, GrowthEffect, PathEffect
+from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, GrowthEffect
 from backdrive_bayes.mechanics.history import History, through
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
@@ -110,17 +111,13 @@ class Posterior:
     def _effects(self, history, log_rate, growth, base):
         """What effects of the reducer itself add, (draws, segments) in shares of the angle scale."""
         found, mean = 0.0, {n: self.flat[n].mean(axis=0) for n in base}
+        turned = sum(base[n] @ mean[n] for n in base)
         for effect in self.effects:
             if effect.name not in self.flat or not effect.of_reducer:
                 continue
-            if isinstance(effect, PathEffect):
-                found = found + self.flat[effect.name] @ effect.responses(history, None, self.context)[1].T
-            elif isinstance(effect, FlankEffect):
-                even = self.reducer.flank_columns(history, mean, growth, ends=True)
-                found = found + self.flat[effect.name] @ even.T
-            elif isinstance(effect, AngleEffect):
-                turned = sum(base[n] @ mean[n] for n in base)
-                found = found + self.flat[effect.name] @ effect.columns(turned).T
+            columns = effect_columns(effect, self.reducer, history, mean, growth, turned, self.context, ends=True)
+            if columns is not None:
+                found = found + self.flat[effect.name] @ columns.T
             elif isinstance(effect, GrowthEffect):
                 term = self.distortion.law(log_rate, history.log_amplitude, self.context)[effect.term]
                 (grown,) = self.reducer.grown(history, mean, growth, effect.part, [term], ends=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.engine.covariance import whitener
+from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.reduced import BlockMeans, Jitter
-from backdrive_bayes.mechanics.effect import AngleEffect, FlankEffect, PathEffect
 from backdrive_bayes.mechanics.history import of_blocks
 
 REPLICATES_A_CHAIN = 50
@@ -52,17 +52,13 @@ def _departures(posterior: Posterior, record: int) -> np.ndarray:
     context, distortion = posterior.context, posterior.distortion
     blocks, own = posterior.records.blocks[record], posterior.records
     history = of_blocks(blocks, context.torque_scale_nm, distortion.offset, distortion.lag_s)
-    shared = (history, distortion.growth(context.log_rate[record] + history.surge, history.log_amplitude, context))
-    columns = posterior.reducer.columns(*shared)
+    growth = distortion.growth(context.log_rate[record] + history.surge, history.log_amplitude, context)
+    columns = posterior.reducer.columns(history, growth)
     mean = {n: posterior.flat[n].mean(axis=0) for n in columns}
-    turned = sum(columns[n] @ mean[n] for n in mean)
+    shared = posterior.reducer, history, mean, growth, sum(columns[n] @ mean[n] for n in mean), context, record
     for effect in (e for e in posterior.effects if e.name in posterior.flat):
-        if isinstance(effect, PathEffect):
-            columns[effect.name] = history.mean(*effect.responses(history, record, context))
-        elif isinstance(effect, FlankEffect):
-            columns[effect.name] = posterior.reducer.flank_columns(history, mean, shared[1])
-        elif isinstance(effect, AngleEffect):
-            columns[effect.name] = effect.columns(turned)
+        if (by := effect_columns(effect, *shared)) is not None:
+            columns[effect.name] = by
     per_record = {e.name for e in posterior.effects if e.per_record}
     found = np.zeros(())
     for name, column in columns.items():

@@ -19,7 +19,7 @@ from backdrive_bayes.mechanics.clearance import joined, spaced
 from backdrive_bayes.mechanics.effect import Distortion, Effect, PathEffect, TangentEffect
 from backdrive_bayes.mechanics.effects.bench_hysteresis import BENCH_HYSTERESIS
 from backdrive_bayes.mechanics.reducer import ReducerClass
-from backdrive_bayes.mechanics.registry import FLANKS, all_effects
+from backdrive_bayes.mechanics.registry import UNEQUAL, all_effects
 
 MOST_FLANKS = 3
 """Flanks at most: each adds some 25 weights. They are selected before the jitter is learnt, which would absorb their residual."""
@@ -220,7 +220,7 @@ class Search:
 
     def _acts(self, effect) -> bool:
         """Whether an effect may be more than a trace: all at the joint mode, else what does not bend and ``only`` these."""
-        if effect.of_class or effect in FLANKS:
+        if effect.of_class or effect in UNEQUAL:
             return True
         if effect.instead:
             return False

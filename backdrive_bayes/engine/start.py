@@ -24,7 +24,8 @@ NEAR, LEAST = 0.3, 0.4
 USUAL = np.array([0.2, 1.0, 0.2])
 """Standard deviations by which the least squares are held: lag [torque scale a unit rate], exponent, drag [torque scale]."""
 MOST = (0.5, 0.2)
-"""Most of an exponent and of a drag, in shares of the torque scale, that a search begins at."""
+"""Most of an exponent and of a drag, in shares of the torque scale, that a search begins at. What the legs
+tell beyond is mostly noise of few crossings; a search that begins too low may go on, one that begins too high ends elsewhere."""
 
 
 def possible_starts(reduced: Reduced) -> list[Distortion]:

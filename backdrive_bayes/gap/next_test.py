@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.gap.shrink import Fitted
-from backdrive_bayes.mechanics.effect import AngleEffect, FlankEffect, GrowthEffect, PathEffect, TangentEffect
+from backdrive_bayes.mechanics.effect import GrowthEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
 
 POINTS = 80
@@ -70,13 +71,9 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
         weight = weights.get(effect.name)
         if weight is None:
             continue
-        if isinstance(effect, PathEffect):
-            columns = effect.responses(history, None, context)[1]
+        columns = effect_columns(effect, linear.reducer, history, mean, growth, turned, context, ends=True)
+        if columns is not None:
             angle = angle + columns @ weight[: columns.shape[1]]
-        elif isinstance(effect, FlankEffect):
-            angle = angle + linear.reducer.flank_columns(history, mean, growth, ends=True) @ weight
-        elif isinstance(effect, AngleEffect):
-            angle = angle + effect.columns(turned) @ weight
         elif isinstance(effect, GrowthEffect):
             term = linear.distortion.law(log_rate, history.log_amplitude, context)[effect.term]
             (by,) = linear.reducer.grown(history, mean, growth, effect.part, [term], ends=True)

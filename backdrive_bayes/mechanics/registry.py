@@ -47,7 +47,7 @@ UNKNOWN = UNEXPLAINED
 """The process that stands for what no listed effect explains."""
 BENCH = (BENCH_HYSTERESIS,)
 """What every bench has at trace level and no diagnosis can name."""
-FLANKS = (UNEQUAL_FLANKS,)
+UNEQUAL = (UNEQUAL_FLANKS,)
 """What every reducer has at trace level and no diagnosis can name: the parts of two flanks are not quite alike. While modes are
 searched it may be more, or the class is bent by what breaks its symmetry."""
 NONCONGRUENT = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE, FRICTION_AMPLITUDE_BEND, DRAG_AMPLITUDE_BEND)
@@ -58,4 +58,4 @@ OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
 
 def library_terms() -> tuple[Effect, ...]:
     """Every term of every listed effect, what every bench has and what every reducer has."""
-    return (*(term for terms in all_effects().values() for term in terms), *BENCH, *FLANKS, *NONCONGRUENT)
+    return (*(term for terms in all_effects().values() for term in terms), *BENCH, *UNEQUAL, *NONCONGRUENT)

@@ -156,12 +156,11 @@ def test_the_period_of_the_wave_is_found():
     assert other.linear.reduced.angle_scale_rad / other.frequency[("encoder_error",)] != pytest.approx(PERIOD_RAD, rel=0.03)
 
 
-def _waving(turns, zeros=(0.0, 0.0), seed=0):
+def _waving(turns, zeros=(0.0, 0.0)):
     """A unit with an encoder's wave of so many periods over its range, each record read from a zero of its own [angle ranges]."""
-    clean = planted(seed, known=smooth_reducer())
-    span = float(np.ptp(clean.records[0].angle_rad))
+    span = float(np.ptp(UNITS["none"]().records[0].angle_rad))
     wave = lambda r: 4e-4 * np.cos(2 * np.pi * turns * r.angle_rad / span)  # noqa: E731
-    return changed(clean, lambda r, i: wave(r) + zeros[i] * span)
+    return changed(UNITS["none"](), lambda r, i: wave(r) + zeros[i] * span)
 
 
 def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
@@ -176,8 +175,9 @@ def test_an_encoder_that_was_zeroed_anew_errs_at_other_angles(monkeypatch):
 
 
 def test_a_wave_of_one_and_a_half_periods_and_a_soft_flank_are_told_apart_by_their_evidence():
-    weighed = weigh(prepare(_waving(1.5, seed=2)))
-    wave, answers = weighed.log_factor, gap.labels(weighed.joint())
+    weighed = weigh(prepare(_waving(1.5)))
+    # What is unlisted holds a wave as slow as that, too.
+    wave, answers = {h: v for h, v in weighed.log_factor.items() if "unknown" not in h}, gap.labels(weighed.joint())
     assert max(wave, key=wave.get) == ("encoder_error",) and wave[("encoder_error",)] > wave[("asymmetric_stiffness",)] + 3
     assert "encoder_error" in gap.credible_set(answers)
     soft = found("asymmetric_stiffness")[0].log_factor

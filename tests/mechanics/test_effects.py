@@ -29,7 +29,7 @@ from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.mechanics.reducer import ReducerClass
 from backdrive_bayes.records.reduction import Blocks
 
-LISTED = (*registry.LIBRARY.values(), registry.FLANKS, (registry.UNKNOWN,))
+LISTED = (*registry.LIBRARY.values(), registry.UNEQUAL, (registry.UNKNOWN,))
 TERMS = {t.name: t for terms in LISTED for t in terms}
 PATHS = [n for n, t in TERMS.items() if isinstance(t, PathEffect)]
 TANGENTS = [n for n, t in TERMS.items() if isinstance(t, TangentEffect)]

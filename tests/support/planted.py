@@ -141,7 +141,7 @@ UNITS = {
     "thermal_drift": lambda: changed(_smooth(loops=MORE), lambda r, i: 1.5e-3 * (r.time_s / 20) ** 0.7),
     "asymmetric_stiffness": lambda: changed(_smooth(), lambda r, i: 0.035 * np.abs(r.torque_nm)),
     "unknown": lambda: stepped(1.5e-3),
-    "second_backlash": lambda: _smooth((0.15, 0.25, 0.35), seed=2),
+    "second_backlash": lambda: _smooth((0.15, 0.25, 0.35)),
     "interface_slip": lambda: _smooth((0.1, 0.75, 1.0)),
 }
 """Units by what is planted in them."""

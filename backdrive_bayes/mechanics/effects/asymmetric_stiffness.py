@@ -12,7 +12,8 @@ SMOOTH = 1.5
 """Length over which the even slope changes with the root of the torque or the angle: stiffness bends over the whole range, damage
 does not."""
 USUAL = 0.02
-"""Usual size, in shares of the angle scale."""
+"""Usual size of either form, in shares of the angle scale: a choice, as sizes from a fifth of it to five times
+are averaged over."""
 
 
 def even(of) -> np.ndarray:
