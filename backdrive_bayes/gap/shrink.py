@@ -148,10 +148,13 @@ def _folds(linear):
 
 
 def within_reach(linear: Linear) -> list[int]:
-    """Folds that the others predict without extrapolating: some other record is as slow, some as fast and some as large."""
+    """Folds that the others predict without extrapolating: some other record is as slow, some as fast and some as large; of the
+    legs of a single record, some other goes the same way (from a leg back the class knows the one forth only by its symmetry)."""
     rate = linear.reduced.context.rate
     if rate.size == 1:
-        return list(range(len(_folds(linear))))
+        (blocks,), (settled,) = linear.reduced.blocks, linear.reduced.settled
+        ways = blocks.direction[np.unique(blocks.leg[settled])]
+        return np.flatnonzero([np.sum(ways == way) > 1 for way in ways]).tolist()
     largest, found = np.array([np.abs(b.turning_nm).max() for b in linear.reduced.blocks]), []
     for k in range(rate.size):
         others = np.delete(np.arange(rate.size), k)

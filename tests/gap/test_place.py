@@ -145,11 +145,28 @@ def test_records_within_reach_are_no_slower_faster_or_larger_than_the_others(rat
     assert within_reach(run_at(rates, amplitudes)) == folds
 
 
-def test_the_legs_of_one_record_are_all_within_reach():
+@pytest.mark.parametrize(
+    ("ways", "settled", "folds"),
+    [
+        ((1,), (0,), []),
+        ((1, -1, 1), (1, 2), []),
+        ((1, -1, 1, -1), (1, 2, 3), [0, 2]),
+        ((1, -1, 1, -1, 1), (1, 2, 3, 4), [0, 1, 2, 3]),
+    ],
+)
+def test_a_leg_of_one_record_is_within_reach_of_another_that_goes_the_same_way(ways, settled, folds):
+    leg = np.repeat(np.arange(len(ways)), 3)
+    blocks = SimpleNamespace(leg=leg, direction=np.array(ways))
+    context = SimpleNamespace(rate=np.ones(1))
+    reduced = SimpleNamespace(context=context, blocks=[blocks], settled=[np.isin(leg, settled)])
+    assert within_reach(SimpleNamespace(reduced=reduced)) == folds
+
+
+def test_folds_within_reach_are_numbered_as_those_that_are_held_out():
     linear = joint_mode(reduce_unit(planted(0, loops=((0.1, 0.1),))), library_terms())
     fitted, gap = fit_hypothesis(linear, (), levels(linear, ())), where.estimate_gap(linear, np.random.default_rng(0))
     held = shrink(fitted, fitted, gap.weight, np.random.default_rng(1))
-    assert within_reach(linear) == list(range(len(held.names))) and len(held.names) >= 2
+    assert held.names == ("leg 2", "leg 3") and within_reach(linear) == []
 
 
 @pytest.mark.parametrize(

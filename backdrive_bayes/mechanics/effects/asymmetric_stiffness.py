@@ -3,11 +3,8 @@
 import numpy as np
 
 from backdrive_bayes.mechanics.effect import AngleEffect, FlankEffect, PathEffect
-from backdrive_bayes.mechanics.history import played
 
 NODES = np.array([0.0, 0.01, 0.03, 0.08, 0.16, 0.28, 0.45, 0.65, 0.85, 1.2])
-BEHIND = (0.0, 0.02, 0.08, 0.3)
-"""Thresholds of friction through which the even part may see the torque."""
 SMOOTH = 1.5
 """Length over which the even slope changes with the root of the torque or the angle: stiffness bends over the whole range, damage
 does not."""
@@ -25,20 +22,15 @@ def even(of) -> np.ndarray:
 
 
 class AsymmetricStiffness(PathEffect):
-    """An angle that is even in the torque, or in the torque behind friction, smooth in the root of its size."""
+    """An angle that is even in the torque, smooth in the root of its size."""
 
     def present(self, context):
         """Two per cent of the angle scale."""
         return USUAL
 
     def responses(self, history, record, context):
-        """Even integrals for every threshold; behind friction at half the size."""
-        begin, end = [], []
-        for threshold in BEHIND:
-            z = played(history.z0[0], history.z1, threshold)
-            for found, ends in ((begin, z[:-1]), (end, z[1:])):
-                found.append(even(ends) * (0.5 if threshold else 1.0))
-        return np.hstack(begin), np.hstack(end)
+        """Even integrals at the segments' ends."""
+        return even(history.z0), even(history.z1)
 
 
 ASYMMETRIC_STIFFNESS = AsymmetricStiffness(
