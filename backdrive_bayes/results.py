@@ -20,7 +20,7 @@ CHECK = "backdrive-bayes/check/1"
 PREDICTION = "backdrive-bayes/prediction/1"
 FLEET = "backdrive-bayes/fleet/1"
 POOL = "backdrive-bayes/pool/1"
-POSTERIOR = "backdrive-bayes/posterior/6"
+POSTERIOR = "backdrive-bayes/posterior/7"
 GROUPS = ("posterior", "unconstrained_posterior", "sample_stats", "posterior_predictive", "observed_data", "constant_data")
 """The groups of a posterior file."""
 SEAL = "content_sha256"

@@ -9,7 +9,7 @@ from support.told import told
 from backdrive_bayes.results import SEAL, digest_of
 
 GROUP_ATTRIBUTES = {
-    "schema": "backdrive-bayes/posterior/6",
+    "schema": "backdrive-bayes/posterior/7",
     "unit": "u",
     "data_sha256": "0123456789abcdef" * 4,
     "modules": "geometric,elastic,friction",

@@ -77,7 +77,7 @@ def _summarise(result: dict, sampled, out: Path) -> None:
     elif not result["inconclusive"]:
         closed = result["shrink"]["closed_fraction"]
         if closed is not None:
-            say(f"closed on held-out data: {share_text(closed)} (90 %)")
+            say(f"share of the gap closed on held-out data: {share_text(closed)} (90 % interval)")
     if sampled is not None:
         show_indicators(sampled[1])
     say(f"written to {out}")

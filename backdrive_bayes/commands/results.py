@@ -67,9 +67,12 @@ class FitOptions:
 
 def add_fit_arguments(parser) -> None:
     """The options of every verb that may fit."""
-    parser.add_argument("--baseline", default=BASELINE, help="modules of the model, comma-separated")
-    parser.add_argument("--k", type=float, default=0.03, help="share of T_r at which lost motion is taken (default 0.03)")
-    parser.add_argument("--level", type=float, default=0.9, help="level of the central intervals (default 0.9)")
+    modules = "modules of the model, comma-separated, out of %(default)s (default: all)"
+    share = "share of the rated torque T_r at which lost motion is taken (default 0.03)"
+    level = "level of the indicators' central intervals (default 0.9); a diagnosis has its own at 0.9"
+    parser.add_argument("--baseline", default=BASELINE, help=modules)
+    parser.add_argument("--k", type=float, default=0.03, help=share)
+    parser.add_argument("--level", type=float, default=0.9, help=level)
     parser.add_argument("--no-figures", action="store_true", help="write no figures")
     add_force_argument(parser)
 

@@ -62,9 +62,8 @@ def _departures(posterior: Posterior, record: int) -> np.ndarray:
     per_record = {e.name for e in posterior.effects if e.per_record}
     found = np.zeros(())
     for name, column in columns.items():
-        weights = posterior.flat.get(name, np.zeros((1, 0)))
-        if name in per_record and weights.shape[1] == column.shape[1] * own.count:
+        weights = posterior.flat[name]
+        if name in per_record:
             weights = np.split(weights, own.count, axis=1)[record]
-        if weights.shape[1] == column.shape[1]:
-            found = found + (weights - weights.mean(axis=0)) @ column.T
+        found = found + (weights - weights.mean(axis=0)) @ column.T
     return found * context.angle_scale_rad

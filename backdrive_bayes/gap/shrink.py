@@ -16,7 +16,7 @@ from backdrive_bayes.engine.design import histories
 from backdrive_bayes.engine.levels import learn_scales
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.marginal import whiten
-from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
+from backdrive_bayes.indicators.same_loop import SAME_AMPLITUDE, same_amplitude, same_rate
 from backdrive_bayes.mechanics.effect import Distortion, PathEffect
 
 RESAMPLED = 400
@@ -149,12 +149,11 @@ def _folds(linear):
 
 def within_reach(linear: Linear) -> list[int]:
     """Folds that the others predict without extrapolating: some other record is as slow, some as fast and some as large; of the
-    legs of a single record, some other goes the same way (from a leg back the class knows the one forth only by its symmetry)."""
+    legs of a single record, some other goes the same way between torques as far apart (from a leg back the class knows the one
+    forth only by its symmetry)."""
     rate = linear.reduced.context.rate
     if rate.size == 1:
-        (blocks,), (settled,) = linear.reduced.blocks, linear.reduced.settled
-        ways = blocks.direction[np.unique(blocks.leg[settled])]
-        return np.flatnonzero([np.sum(ways == way) > 1 for way in ways]).tolist()
+        return _repeated_legs(linear.reduced.blocks[0], linear.reduced.settled[0])
     largest, found = np.array([np.abs(b.turning_nm).max() for b in linear.reduced.blocks]), []
     for k in range(rate.size):
         others = np.delete(np.arange(rate.size), k)
@@ -163,6 +162,16 @@ def within_reach(linear: Linear) -> list[int]:
         if slower and faster and larger:
             found.append(k)
     return found
+
+
+def _repeated_legs(blocks, settled) -> list[int]:
+    """Numbers, among the settled legs of a record, of those that another one runs over as well, in the same direction."""
+    legs = np.unique(blocks.leg[settled])
+    begin, end = blocks.direction[legs] * blocks.turning_nm[legs], blocks.direction[legs] * blocks.turning_nm[legs + 1]
+    slack = SAME_AMPLITUDE * np.abs(blocks.turning_nm).max()
+    over = (begin <= begin[:, None] + slack) & (end >= end[:, None] - slack)
+    same = blocks.direction[legs] == blocks.direction[legs, None]
+    return np.flatnonzero(np.sum(over & same, axis=1) > 1).tolist()
 
 
 def _held_out(fitted: Fitted, own, record) -> tuple[np.ndarray, np.ndarray]:

@@ -146,27 +146,43 @@ def test_records_within_reach_are_no_slower_faster_or_larger_than_the_others(rat
 
 
 @pytest.mark.parametrize(
-    ("ways", "settled", "folds"),
+    ("turning", "settled", "folds"),
     [
-        ((1,), (0,), []),
-        ((1, -1, 1), (1, 2), []),
-        ((1, -1, 1, -1), (1, 2, 3), [0, 2]),
-        ((1, -1, 1, -1, 1), (1, 2, 3, 4), [0, 1, 2, 3]),
+        ((-1.0, 1.0), (0,), []),
+        ((0.0, 1.0, -1.0, 1.0), (1, 2), []),
+        ((0.0, 1.0, -1.0, 1.0, -1.01), (1, 2, 3), [0, 2]),
+        ((0.0, 1.0, -1.0, 1.0, -1.0, 1.0), (1, 2, 3, 4), [0, 1, 2, 3]),
+        # A short leg is seen by a long one, not the other way round.
+        ((0.0, 1.0, -1.0, 1.0, 0.0), (1, 2, 3), [2]),
     ],
 )
-def test_a_leg_of_one_record_is_within_reach_of_another_that_goes_the_same_way(ways, settled, folds):
-    leg = np.repeat(np.arange(len(ways)), 3)
-    blocks = SimpleNamespace(leg=leg, direction=np.array(ways))
-    context = SimpleNamespace(rate=np.ones(1))
-    reduced = SimpleNamespace(context=context, blocks=[blocks], settled=[np.isin(leg, settled)])
+def test_a_leg_of_one_record_is_within_reach_of_another_that_runs_over_it(turning, settled, folds):
+    turning = np.array(turning)
+    leg = np.repeat(np.arange(turning.size - 1), 3)
+    blocks = SimpleNamespace(leg=leg, turning_nm=turning, direction=np.sign(np.diff(turning)))
+    reduced = SimpleNamespace(context=SimpleNamespace(rate=np.ones(1)), blocks=[blocks], settled=[np.isin(leg, settled)])
     assert within_reach(SimpleNamespace(reduced=reduced)) == folds
 
 
-def test_folds_within_reach_are_numbered_as_those_that_are_held_out():
-    linear = joint_mode(reduce_unit(planted(0, loops=((0.1, 0.1),))), library_terms())
+def repeated(unit, cycles):
+    """The unit with the cycle of its one record, which are its last four fifths, run several times."""
+    (record,) = unit.records
+    first = record.time_s.size // 5
+    span = record.time_s[-1] - record.time_s[first]
+    parts = {name: [getattr(record, name)] for name in ("time_s", "torque_nm", "angle_rad")}
+    for k in range(1, cycles):
+        parts["time_s"].append(record.time_s[first + 1 :] + k * span)
+        parts["torque_nm"].append(record.torque_nm[first + 1 :])
+        parts["angle_rad"].append(record.angle_rad[first + 1 :])
+    return replace(unit, records=(replace(record, **{name: np.concatenate(of) for name, of in parts.items()}),))
+
+
+@pytest.mark.parametrize(("cycles", "names"), [(1, []), (2, ["leg 2", "leg 3", "leg 4", "leg 5"])])
+def test_legs_within_reach_are_numbered_as_those_that_are_held_out(cycles, names):
+    linear = joint_mode(reduce_unit(repeated(planted(0, loops=((0.1, 0.1),)), cycles)), library_terms())
     fitted, gap = fit_hypothesis(linear, (), levels(linear, ())), where.estimate_gap(linear, np.random.default_rng(0))
     held = shrink(fitted, fitted, gap.weight, np.random.default_rng(1))
-    assert held.names == ("leg 2", "leg 3") and within_reach(linear) == []
+    assert [held.names[k] for k in within_reach(linear)] == names and len(held.names) == 2 * cycles
 
 
 @pytest.mark.parametrize(
