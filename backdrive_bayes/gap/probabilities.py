@@ -44,10 +44,10 @@ CALIBRATION = Calibration()
 DOF = 4
 """Degrees of freedom of what is left: a noise level may be wrong by more than its usual error."""
 T_HEIGHT = gamma((DOF + 1) / 2) / gamma(DOF / 2) / np.sqrt(np.pi * DOF)
-CALM = 0.5
-"""Standard deviation, in that of the noise of a sample, about which the wander of a reading is half-normal where nothing acts;
-where something does it is 1, as everywhere while it is learnt. None of 116 clean units had a wander of 2, of 270 others a
-fourth."""
+CALM = 0.4
+"""Mean, in the standard deviation of the noise of a sample, of the wander of a reading where nothing acts, exponential as it is
+about 1 where something does. Of 166 clean units on virtual benches 4 % had a wander of 1 and 2 % of 2, of 397 others 18 and
+26 %."""
 TEMPERATURES = (1.0, np.exp(-1.0), np.exp(-2.0))
 """Shares of the highest temperature that are averaged over."""
 
@@ -104,7 +104,7 @@ def _weights(slow, leaps, disturbance, wander, misfit, temperatures, calibration
         unlisted_prior = calibration.beside if effects else calibration.unlisted
         kinds = log(KINDS) + _of_kinds(slow.get(more, value), value, temperature), disturbance + value / temperature
         weight[more] = np.logaddexp(*kinds) - log(KINDS + 1) + prior + unlisted_prior + due
-    weight[()] -= 0.5 * wander**2 * (CALM**-2 - 1.0)
+    weight[()] -= wander * (1.0 / CALM - 1.0)
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
 

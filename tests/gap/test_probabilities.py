@@ -43,7 +43,7 @@ def test_a_wander_larger_than_the_noise_speaks_against_nothing_and_for_no_name_m
     fallen = {h: np.log(calm[h] / wandering[h]) for h in calm}
     others = [fallen[h] for h in fallen if h]
     np.testing.assert_allclose(others, others[0], atol=1e-12)
-    # The ratio of two half-normal densities at 1, of standard deviations of a half and of one, but for their values at 0.
+    # The ratio of two exponential densities at 1, of means 0.4 and 1, but for their values at 0.
     assert fallen[()] - others[0] == pytest.approx(1.5)
     assert labels(answer(given_factors(), wander=2.0))["none"] < 0.3
 
