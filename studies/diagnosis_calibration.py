@@ -81,7 +81,6 @@ def weigh_unit(folder: Path, truth: dict) -> dict:
         "log_factor": {"+".join(h): round(v, 2) for h, v in found.weighed.log_factor.items()},
         "leaps": {"+".join(h): round(v, 2) for h, v in found.weighed.leaps.items()},
         "disturbance": round(found.weighed.disturbance, 2),
-        "wander": round(found.weighed.wander, 4),
         "left": {"+".join(h): round(v, 3) for h, v in found.weighed.left.items()},
         "properties": {p.name: round(p.probability, 4) for p in found.properties},
         "named": "+".join(found.named) or "none",
@@ -127,7 +126,7 @@ def answers(row: dict, calibration: Calibration) -> dict[str, float]:
     if "error" in row:
         return {"not read": 0.0}
     log_factor, leaps, line, left, properties = (row[k] for k in ("log_factor", "leaps", "disturbance", "left", "properties"))
-    found = labels(probabilities(log_factor, leaps, line, row["wander"], left, properties, calibration))
+    found = labels(probabilities(log_factor, leaps, line, left, properties, calibration))
     likeliest = next(iter(found))
     return moved_to_unknown(found, likeliest) if row.get("unsupported") and row["named"] == likeliest else found
 

@@ -23,16 +23,6 @@ PRICE = float(np.log(len(SIZES) * len(TIMES)))
 """What a wander of one of these sizes and times costs."""
 
 
-def largest_wander(reduced: Reduced) -> float:
-    """The largest wander of a record, in the standard deviation of the noise of a sample."""
-    return max(n.wander_rad / _usual(n) for n in reduced.noise)
-
-
-def _usual(noise: NoiseEstimate) -> float:
-    """Standard deviation [rad] of the noise of a sample."""
-    return float(np.hypot(noise.white_rad, noise.correlated_rad))
-
-
 def learn_wander(linear: Linear) -> tuple[Reduced, float]:
     """The unit with the wander of each record that has the highest marginal likelihood times its prior, other things as they are,
     and the gain in it less PRICE each; a record that gains no more has none.
@@ -54,7 +44,7 @@ def _learn(linear: Linear, record: int, rest) -> tuple[NoiseEstimate, float, np.
     scale = np.exp([linear.log_scale[n] for n in linear.design.names])[linear.design.index]
     columns = np.hstack([g.of_record(record) for g in linear.design.groups])
     still = linear.covariances[record] - channel_covariance(blocks, noise) / reduced.angle_scale_rad**2
-    usual = _usual(noise)
+    usual = float(np.hypot(noise.white_rad, noise.correlated_rad))
     leg = float(blocks.end_s[-1] - blocks.begin_s[0]) / blocks.direction.size
     tried: dict[tuple[int, int], tuple] = {}
 

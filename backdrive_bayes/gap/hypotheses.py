@@ -13,7 +13,6 @@ from backdrive_bayes.engine.jumps import Jumps, find_jumps
 from backdrive_bayes.engine.levels import learn_scales, levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.periodic import with_wave
-from backdrive_bayes.engine.wander import largest_wander
 from backdrive_bayes.gap.probabilities import probabilities
 from backdrive_bayes.gap.table import ENCODER, STICK_SLIP, UNEXPLAINED, Table
 from backdrive_bayes.mechanics.registry import all_effects
@@ -22,15 +21,13 @@ from backdrive_bayes.mechanics.registry import all_effects
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """Log marginal likelihoods of sets of effects, relative to none, with what they rest on; ``leaps`` is what the samples' teeth
-    have of those with stick-slip, ``disturbance`` the log Bayes factor of a periodic disturbance in the samples, ``wander`` the
-    largest of a reading where nothing acts, in its noise."""
+    have of those with stick-slip, ``disturbance`` the log Bayes factor of a periodic disturbance in the samples."""
 
     linears: tuple[Linear, ...]
     mode: dict[tuple[str, ...], int]
     log_factor: dict[tuple[str, ...], float]
     leaps: dict[tuple[str, ...], float]
     disturbance: float
-    wander: float
     frequency: dict[tuple[str, ...], float]
     jumps: Jumps
     left: dict[tuple[str, ...], float]
@@ -44,7 +41,7 @@ class Weighed:
 
     def joint(self, properties: Mapping[str, float] | None = None) -> dict[tuple[str, ...], float]:
         """Probability of every set of effects; ``properties`` are those of effects inside the class, each taken alone."""
-        return probabilities(self.log_factor, self.leaps, self.disturbance, self.wander, self.left, properties or {})
+        return probabilities(self.log_factor, self.leaps, self.disturbance, self.left, properties or {})
 
     def of(self, effects: tuple[str, ...]) -> Linear:
         """The linear model about the mode where a hypothesis is most likely."""
@@ -87,7 +84,6 @@ def weigh(linears: tuple[Linear, ...], allowed=None) -> Weighed:
         {h: f.log_marginal - none for h, f in found.items()},
         {h: f.leaps for h, f in found.items() if STICK_SLIP in h},
         disturbance(linears[0].reduced),
-        largest_wander(linears[mode[()]].reduced),
         {h: f.frequency for h, f in found.items() if f.frequency is not None},
         jumps,
         {h: f.left for h, f in found.items() if f.left is not None},

@@ -44,10 +44,6 @@ CALIBRATION = Calibration()
 DOF = 4
 """Degrees of freedom of what is left: a noise level may be wrong by more than its usual error."""
 T_HEIGHT = gamma((DOF + 1) / 2) / gamma(DOF / 2) / np.sqrt(np.pi * DOF)
-CALM = 0.4
-"""Mean, in the standard deviation of the noise of a sample, of the wander of a reading where nothing acts, exponential as it is
-about 1 where something does. Of 166 clean units on virtual benches 4 % had a wander of 1 and 2 % of 2, of 397 others 18 and
-26 %."""
 TEMPERATURES = (1.0, np.exp(-1.0), np.exp(-2.0))
 """Shares of the highest temperature that are averaged over."""
 
@@ -56,7 +52,6 @@ def probabilities(
     log_factor: Mapping[tuple[str, ...], float],
     leaps: Mapping[tuple[str, ...], float],
     disturbance: float,
-    wander: float,
     left: Mapping[tuple[str, ...], float],
     properties: Mapping[str, float],
     calibration: Calibration = CALIBRATION,
@@ -66,15 +61,14 @@ def probabilities(
     ``log_factor`` are log Bayes factors against none, of which ``leaps`` is what the samples say of leaps, where they are one of
     the effects, and the rest what the contrasts say: each has a temperature of its own. ``disturbance`` is that of a periodic
     disturbance in the samples, a kind of what is unlisted; one frequency in several records is no matter of any model, and is not
-    coarsened. ``wander`` is the largest of a reading where nothing acts, in its noise: a large one tells of something, listed or
-    not; prior weights are those of units that have none. ``left`` is the variance of the contrasts in noise units that each set
-    without something unlisted leaves, ``properties`` are the probabilities of effects inside the class, each taken alone.
+    coarsened. ``left`` is the variance of the contrasts in noise units that each set without something unlisted leaves,
+    ``properties`` are the probabilities of effects inside the class, each taken alone.
     """
     slow = {effects: value - leaps.get(effects, 0.0) for effects, value in log_factor.items()}
     misfit = _misfits(leaps, left, calibration)
     hottest = np.array([_hottest(table.values(), calibration) for table in (slow, leaps)])
     heated = [np.maximum(hottest * share, 1.0) for share in TEMPERATURES]
-    found = [_weights(slow, leaps, disturbance, wander, misfit, temperatures, calibration) for temperatures in heated]
+    found = [_weights(slow, leaps, disturbance, misfit, temperatures, calibration) for temperatures in heated]
     joint = {h: float(sum(f[h] for f in found)) / len(found) for h in found[0]}
     for name, p in properties.items():
         joint = _beside(joint, name, p, calibration)
@@ -90,7 +84,7 @@ def _hottest(log_factors, calibration) -> float:
 
 
 @np.errstate(invalid="ignore")
-def _weights(slow, leaps, disturbance, wander, misfit, temperatures, calibration) -> dict[tuple[str, ...], float]:
+def _weights(slow, leaps, disturbance, misfit, temperatures, calibration) -> dict[tuple[str, ...], float]:
     """Probability of every set of effects and of the same with something unlisted beside, without the operator's properties."""
     weight, least, temperature = {}, min(misfit.values()), temperatures[0]
     for effects, value in slow.items():
@@ -104,7 +98,6 @@ def _weights(slow, leaps, disturbance, wander, misfit, temperatures, calibration
         unlisted_prior = calibration.beside if effects else calibration.unlisted
         kinds = log(KINDS) + _of_kinds(slow.get(more, value), value, temperature), disturbance + value / temperature
         weight[more] = np.logaddexp(*kinds) - log(KINDS + 1) + prior + unlisted_prior + due
-    weight[()] -= wander * (1.0 / CALM - 1.0)
     value = np.array(list(weight.values()))
     return dict(zip(weight, np.exp(value - logsumexp(value)), strict=True))
 

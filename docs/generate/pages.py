@@ -59,7 +59,6 @@ NUMBERS = {
     "max_rhat": f"{diagnostics.MAX_RHAT:g}",
     "min_ess": f"{diagnostics.MIN_ESS:g}",
     "ensembles": str(sample.ENSEMBLES),
-    "calm": f"{probabilities.CALM:g}",
     "least_closed": f"{100 * examine.LEAST_CLOSED:g} %",
     "usual": f"{properties.USUAL:g}",
     "large": f"{properties.LARGE:g}",

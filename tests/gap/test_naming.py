@@ -109,7 +109,7 @@ def test_what_acts_beside_stick_slip_is_named_with_it(name):
     answers = gap.labels(weighed.joint())
     assert next(iter(answers)) == both and answers[both] > 0.5
     seen = dict.fromkeys(weighed.leaps, 1e-9)
-    wrong = gap.labels(gap.probabilities(weighed.log_factor, seen, weighed.disturbance, weighed.wander, weighed.left, {}))
+    wrong = gap.labels(gap.probabilities(weighed.log_factor, seen, weighed.disturbance, weighed.left, {}))
     assert wrong[both] < answers[both] - (0.3 if name == "thermal_drift" else 0.01)
     # Teeth that do not scatter the block means cost no more than not to have known that.
     assert weighed.log_factor[("stick_slip",)] > weighed.leaps[("stick_slip",)] - 0.7

@@ -18,9 +18,9 @@ def given_factors(lag=0.0, drift=0.0, both=0.0, unknown=0.0):
     return log | {("lag", "unknown"): max(lag, unknown), ("drift", "unknown"): max(drift, unknown)}
 
 
-def answer(log, left=None, properties=None, leaps=None, disturbance=-np.inf, wander=0.0, calibration=CALIBRATION):
+def answer(log, left=None, properties=None, leaps=None, disturbance=-np.inf, calibration=CALIBRATION):
     left = {h: 1.0 for h in log if "unknown" not in h} | (left or {})
-    return probabilities(log, leaps or {}, disturbance, wander, left, properties or {}, calibration)
+    return probabilities(log, leaps or {}, disturbance, left, properties or {}, calibration)
 
 
 @given(FACTORS, FACTORS, FACTORS, FACTORS, st.floats(0.03, 0.97))
@@ -35,17 +35,6 @@ def test_probabilities_are_probabilities(lag, drift, both, unknown, p):
 def test_nothing_is_likeliest_where_nothing_speaks():
     found = labels(answer(given_factors()))
     assert next(iter(found)) == "none" and found["none"] > 0.6
-
-
-def test_a_wander_larger_than_the_noise_speaks_against_nothing_and_for_no_name_more_than_another():
-    # Factors of one: there is one temperature only.
-    calm, wandering = (answer(given_factors(), wander=w) for w in (0.0, 1.0))
-    fallen = {h: np.log(calm[h] / wandering[h]) for h in calm}
-    others = [fallen[h] for h in fallen if h]
-    np.testing.assert_allclose(others, others[0], atol=1e-12)
-    # The ratio of two exponential densities at 1, of means 0.4 and 1, but for their values at 0.
-    assert fallen[()] - others[0] == pytest.approx(1.5)
-    assert labels(answer(given_factors(), wander=2.0))["none"] < 0.3
 
 
 def test_more_evidence_makes_a_name_more_probable():
