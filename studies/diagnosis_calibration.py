@@ -33,7 +33,8 @@ SETS = 0.9
 FLOOR = 1e-3
 """Probability below which a log score counts no further."""
 UNSEEN = """The defaults were set on rows of an earlier class, with `unlisted` raised for the odds of its kinds, no longer
-coarsened. Those set on all rows here have a mean log score of -1.18 over the 403 units on which they were set, the defaults -1.19.
+coarsened. Those set on all rows here have a mean log score of -1.18 over the 403 units on which they were set, the
+defaults -1.19.
 
 Only the calibration numbers are set on the other benches, in a search that begins at round numbers. Thresholds of properties,
 trace levels, the lowest frequency of a wave, the kinds of what is unlisted and the terms themselves were developed with units of
