@@ -23,6 +23,8 @@ TERMS = [
     ("Gaussian process", "a residual curve free to bend anywhere, as a control: it closes a gap without naming a cause"),
 ]
 """What the words of this chapter mean."""
+RIVALS = 5
+"""Other answers of the credible set that the banner names at most; the figure below it shows them all."""
 
 
 def verdict(saved: Diagnosed) -> tuple[str, str, str]:
@@ -89,7 +91,8 @@ def _join(*sentences):
 def _rivals(saved):
     named = frozenset(saved.effects or ["none"])
     rivals = [label_words(e) for e in saved.credible_set if frozenset(e.split("+")) != named]
-    return f"Not ruled out at 90 %: {', '.join(rivals)}." if rivals else ""
+    more = f" and {len(rivals) - RIVALS} more" if len(rivals) > RIVALS else ""
+    return f"Not ruled out at 90 %: {', '.join(rivals[:RIVALS])}{more}." if rivals else ""
 
 
 def _closed(saved):

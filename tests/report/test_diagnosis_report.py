@@ -1,6 +1,7 @@
 """The chapter of a diagnosis: its numbers are those of diagnosis.json, and what is missing is left out."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from support.made_up_diagnosis import simulator, write_diagnosis
@@ -9,7 +10,7 @@ from support_results import write_result
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.number_text import interval_text, probability_text, significant
-from backdrive_bayes.report import report
+from backdrive_bayes.report import diagnosis_text, report
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
 
@@ -223,3 +224,11 @@ def test_a_simulator_that_lacks_nothing(tmp_path, told, title):
     write_diagnosis(tmp_path, 1, **simulator(1, told=told), answer=answer)
     pages = pages_of(tmp_path)
     assert title in pages[0] and ("closed by re-tuning" in pages[1]) == told
+
+
+def test_the_banner_names_five_rivals_and_counts_the_rest():
+    rivals = [f"effect_{k}" for k in range(7)]
+    several = SimpleNamespace(effects=["slip"], credible_set=["slip", *rivals])
+    assert diagnosis_text._rivals(several).endswith("effect 4 and 2 more.") and "effect 5" not in diagnosis_text._rivals(several)
+    few = SimpleNamespace(effects=["slip"], credible_set=["slip", *rivals[:5]])
+    assert diagnosis_text._rivals(few).endswith("effect 4.")
