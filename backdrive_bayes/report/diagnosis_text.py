@@ -24,7 +24,7 @@ TERMS = [
 ]
 """What the words of this chapter mean."""
 RIVALS = 5
-"""Other answers of the credible set that the banner names at most; the figure below it shows them all."""
+"""Other answers of the credible set that the banner names at most: more would push the figure, which shows all, off the page."""
 
 
 def verdict(saved: Diagnosed) -> tuple[str, str, str]:

@@ -167,14 +167,11 @@ def test_a_leg_of_one_record_is_within_reach_of_another_that_runs_over_it(turnin
 def repeated(unit, cycles):
     """The unit with the cycle of its one record, which are its last four fifths, run several times."""
     (record,) = unit.records
-    first = record.time_s.size // 5
-    span = record.time_s[-1] - record.time_s[first]
-    parts = {name: [getattr(record, name)] for name in ("time_s", "torque_nm", "angle_rad")}
-    for k in range(1, cycles):
-        parts["time_s"].append(record.time_s[first + 1 :] + k * span)
-        parts["torque_nm"].append(record.torque_nm[first + 1 :])
-        parts["angle_rad"].append(record.angle_rad[first + 1 :])
-    return replace(unit, records=(replace(record, **{name: np.concatenate(of) for name, of in parts.items()}),))
+    every = np.arange(record.time_s.size)
+    run = np.r_[every, np.tile(every[every.size // 5 + 1 :], cycles - 1)]
+    time = record.time_s[1] * np.arange(run.size)
+    longer = replace(record, time_s=time, torque_nm=record.torque_nm[run], angle_rad=record.angle_rad[run])
+    return replace(unit, records=(longer,))
 
 
 @pytest.mark.parametrize(("cycles", "names"), [(1, []), (2, ["leg 2", "leg 3", "leg 4", "leg 5"])])
