@@ -80,23 +80,39 @@ def follow_torque(record: Record, segments, sd_nm: float, ends_s: tuple[float, f
         nodes[end] = ends_s[end]
     # Samples may share a stamp.
     time = np.maximum.accumulate(nodes) + 1e-12 * (nodes[-1] - nodes[0]) * np.arange(len(nodes))
-    tips = _tips(record, segments, time, np.array(values))
+    weight = np.r_[samples, 0.0] + np.r_[0.0, samples]
+    tips = _tips(record, segments, time, np.array(values), weight)
     turns = _turns(record, time, np.array(values), tips, [s.direction for s in segments])
-    torque = _monotone(np.array(values), np.array(samples, float), turns)
+    torque = _monotone(np.array(values), weight, turns)
     return TorquePath(time, torque, torque[tips], np.array(samples))
 
 
-def _tips(record, segments, time, torque) -> list[int]:
-    """Knots at which legs begin and end: the farthest between the middles of two. So are those of the first and the last leg, for
-    a record may begin or end with a bit of another, too short for one of its own."""
+def _tips(record, segments, time, torque, weight) -> list[int]:
+    """Knots at which legs begin and end: between the middles of two, where the torque is best taken as going one way up to there
+    and back from there. The farthest need not be it, for where a clearance is crossed a drive surges and rings beyond the tip. So
+    are those of the first and the last leg, for a record may begin or end with a bit of another, too short for one of its own."""
     middle = [record.time_s[(s.start + s.stop - 1) // 2] for s in segments]
     first = max(int(np.searchsorted(time, middle[0])), 1)
-    found = [int(np.argmin(segments[0].direction * torque[:first]))]
+    found = [_mode(-segments[0].direction * torque[:first], weight[:first])]
     for s, begin, end in zip(segments, middle, [*middle[1:], np.inf], strict=True):
         first, last = np.searchsorted(time, [begin, end])
         first = min(max(first, found[-1] + 1), time.size - 1)
-        found.append(int(first + np.argmax(s.direction * torque[first : max(last, first + 1)])))
+        own = slice(first, max(last, first + 1))
+        found.append(int(first + _mode(s.direction * torque[own], weight[own])))
     return found
+
+
+def _mode(height, weight) -> int:
+    """Where ``height`` turns if it rises up to there and falls from there: the best of its local maxima, by the sum of what
+    is left, not of its squares, which would rather leave out a spike of a few samples than the ramp beyond."""
+    padded = np.r_[-np.inf, height, -np.inf]
+    tops = np.flatnonzero((height >= padded[:-2]) & (height > padded[2:]))
+
+    def left(values, own):
+        return float(own @ np.abs(values - isotonic_regression(values, weights=own).x))
+
+    costs = [left(height[: t + 1], weight[: t + 1]) + left(height[t:][::-1], weight[t:][::-1]) for t in tops]
+    return int(tops[np.argmin(costs)])
 
 
 def _turns(record, time, torque, tips, directions) -> list[int]:
@@ -120,9 +136,9 @@ def _turned(record, begin_s, end_s) -> float:
     return float((time - time.mean()) @ record.angle_rad[own])
 
 
-def _monotone(torque, samples, turns) -> np.ndarray:
+def _monotone(torque, weight, turns) -> np.ndarray:
     """The path without what goes back between two turns, which stay."""
-    weight = np.r_[samples, 0.0] + np.r_[0.0, samples]
+    weight = weight.copy()
     weight[turns] = TIP * weight.max()
     for begin, end in pairwise(turns):
         own, direction = slice(begin, end + 1), np.sign(torque[end] - torque[begin])

@@ -162,6 +162,26 @@ def test_a_torque_that_goes_back_within_a_leg_is_followed_where_the_angle_turns_
     assert turns() == (3 if turns_back else 7)
 
 
+def test_the_ringing_of_a_drive_is_no_tip(monkeypatch):
+    """Across a clearance the torque of a drive rings beyond the tip, as on the measured cycloidal units, for a fiftieth of a leg.
+    The planted fault takes the farthest torque for the tip."""
+    time, torque = ramps((0, 1, -1, 1, 0), rate=0.5, hertz=500.0)
+    rung = torque.copy()
+    for begin in (1.4, 5.2, 9.3):
+        own = slice(*np.searchsorted(time, [begin, begin + 0.08]))
+        rung[own] += 1.2 * np.sin(2.0 * np.pi * (time[own] - begin) / 0.02)
+    assert np.abs(rung).max() > 1.7
+
+    def reached():
+        blocks = reduce_unit(turned(rung, time, acting=torque)).blocks[0]
+        assert blocks.direction.size == 4
+        return np.abs(blocks.turning_nm - [0.0, 1.0, -1.0, 1.0, 0.0]).max()
+
+    assert reached() < 0.02
+    monkeypatch.setattr(torque_path, "_mode", lambda height, weight: int(np.argmax(height)))
+    assert reached() > 0.3
+
+
 def test_short_rests_between_fast_rises_are_followed(monkeypatch):
     """Dead weights put on by hand: lines that rest are joined by what was read between, not where they would meet. The planted
     fault joins them wherever that is."""
