@@ -68,13 +68,15 @@ def with_wild_bridged(record: Record) -> Record:
 
 
 def _without_wild(record: Record) -> Record:
-    wild = find_wild(record.torque_nm, SPOILING_SHARE) | find_wild(record.angle_rad, SPOILING_SHARE)
-    count = int(wild.sum())
+    """Until no sample is left that is isolated among those that are left: what was done once more would change nothing."""
+    left = record
+    while (wild := find_wild(left.torque_nm, SPOILING_SHARE) | find_wild(left.angle_rad, SPOILING_SHARE)).any():
+        left = replace(left, **{name: getattr(left, name)[~wild] for name in ("time_s", "torque_nm", "angle_rad")})
+    count = record.time_s.size - left.time_s.size
     if not count:
         return record
     note = f"{count} isolated sample{'s'[: count != 1]} far from the neighbours left out"
-    kept = {name: getattr(record, name)[~wild] for name in ("time_s", "torque_nm", "angle_rad")}
-    return replace(record, **kept, notes=(*record.notes, note))
+    return replace(left, notes=(*record.notes, note))
 
 
 def find_plateaus(time_s: np.ndarray, torque_nm: np.ndarray, low: float, high: float) -> list[dict]:

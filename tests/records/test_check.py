@@ -5,7 +5,7 @@ import pytest
 from conftest import answer, ramps
 
 from backdrive_bayes.records.check import check_unit
-from backdrive_bayes.records.faults import without_wild
+from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild, without_wild
 from backdrive_bayes.records.record import Record, Unit
 
 ARCMIN = np.pi / 10800
@@ -165,3 +165,13 @@ def test_spikes_are_left_out_with_a_note_and_nothing_else_is():
     np.testing.assert_array_equal(first.torque_nm, np.delete(torque, [150, 700]))
     np.testing.assert_array_equal(first.time_s, np.delete(time, [150, 700]))
     assert first.notes == ("said before", "2 isolated samples far from the neighbours left out")
+
+
+def test_what_was_rid_of_spikes_has_none_left():
+    """A ring of a few samples hides some of its own. The planted fault is to look once."""
+    time, torque = ramps(noise=0.002)
+    torque[300:305] += 0.9, 0.9, -0.9, 0.9, 0.9
+    unit = Unit("u", 1.0, (Record("r.csv", time, torque, answer(ramps()[1])),))
+    done = without_wild(unit)
+    assert without_wild(done).records[0] is done.records[0]
+    assert find_wild(torque[~find_wild(torque, SPOILING_SHARE)], SPOILING_SHARE).any()
