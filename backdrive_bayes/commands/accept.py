@@ -90,13 +90,15 @@ def _fit(args, limits, options, note):
     from backdrive_bayes.decisions.acceptance import limited_loops
     from backdrive_bayes.decisions.evidence import Evidence
     from backdrive_bayes.decisions.loops import measured_loops
+    from backdrive_bayes.engine.infer import record_facts
+    from backdrive_bayes.engine.reduced import reduce_unit
 
     ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
     unit = ready.unit
     # A limit that no record can tell of is said before the sampling, not after it.
-    told = [[r[key]["estimated"] for r in ready.checked["records"]] for key in ("loading_rate_Nm_per_s", "amplitude_Nm")]
+    facts = record_facts(reduce_unit(unit))
     for limit in limits.limits:
-        limited_loops(limit, measured_loops(*told))
+        limited_loops(limit, measured_loops(facts.rate_nm_per_s, facts.amplitude_nm))
     wanted = {limit.k for limit in limits.limits if limit.k is not None}
     if len(wanted) > 1:
         raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ReadyUnit:
-    """A unit as read, without wild samples; ``checked`` is what check_unit says, ``forced`` whether errors were overruled."""
+    """A unit without wild samples; ``checked`` is what check_unit says of it as read, ``forced`` that errors were overruled."""
 
     unit: Unit
     checked: dict
@@ -42,12 +42,11 @@ def judged(unit, k: float = 0.03, force: bool = False, where: object = "") -> Re
     from backdrive_bayes.records.check import check_unit
     from backdrive_bayes.records.faults import without_wild
 
-    unit = without_wild(unit)
     checked = check_unit(unit, k)
     if not checked["may_infer"] and not force:
         expected = "data fit for inference (--force, in Python force=True, goes on regardless)"
         raise BadInput(where or unit.name, expected, checked["reason"])
-    return ReadyUnit(unit, checked, not checked["may_infer"])
+    return ReadyUnit(without_wild(unit), checked, not checked["may_infer"])
 
 
 def ready_unit(path: Path, k: float = 0.03, force: bool = False) -> ReadyUnit:

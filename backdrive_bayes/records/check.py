@@ -7,7 +7,16 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from backdrive_bayes.records.branches import find_branches, find_segments
-from backdrive_bayes.records.faults import find_gaps, find_plateaus, find_wild, longest_frozen, quantum, with_wild_bridged
+from backdrive_bayes.records.faults import (
+    find_gaps,
+    find_plateaus,
+    find_wild,
+    frozen_torque,
+    gaps_after,
+    longest_frozen,
+    quantum,
+    with_wild_bridged,
+)
 from backdrive_bayes.records.findings import Finding, errors_of, warnings_of
 from backdrive_bayes.records.judge_physics import judge_line, judge_lost_motion, judge_physics, judge_rated_torque
 from backdrive_bayes.records.lines import clearest_line
@@ -67,19 +76,20 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
     noise = estimate_noise(time, torque, angle, segments)
     line = clearest_line(ChannelRecord(time, torque, angle, segments), noise)
     loop, rise = measure_loop(record, segments, noise), angle_rise(torque, angle, segments, noise)
-    low, high = extremes(torque, segments)
+    low, high = extremes(time, torque, segments)
     found = {
         "record": record.name,
         "samples": len(time),
         "duration_s": float(time[-1] - time[0]),
         "sampling": _sampling(time),
         "gaps": find_gaps(time, torque),
+        "gap_count": int(gaps_after(time).size),
         **channels,
         "plateaus": find_plateaus(time, torque, low, high),
         "angle_range_rad": float(np.ptp(angle)),
         "angle_signal_rad": _signal(angle),
         "branches": [_branch(branch, torque) for branch in branches],
-        "cycles": int(cycle_count(torque, segments) + 0.05),
+        "cycles": int(cycle_count(time, torque, segments) + 0.05),
         "torque_range_Nm": [low, high],
         "amplitude_Nm": {"estimated": 0.5 * (high - low), "declared": record.amplitude_nm},
         "loading_rate_Nm_per_s": {"estimated": loading_rate(time, torque, segments), "declared": record.loading_rate_nm_per_s},
@@ -106,7 +116,7 @@ def _channels(record: Record) -> dict:
     torque, angle = record.torque_nm, record.angle_rad
     return {
         "drop_outs": {"torque": int(find_wild(torque).sum()), "angle": int(find_wild(angle).sum())},
-        "frozen": {"torque": longest_frozen(torque, angle), "angle": longest_frozen(angle, torque)},
+        "frozen": {"torque": frozen_torque(torque, angle), "angle": longest_frozen(angle, torque)},
         "angle_quantum_rad": quantum(angle),
     }
 

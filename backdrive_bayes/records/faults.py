@@ -14,9 +14,11 @@ SPOILING_SHARE = 0.1
 """Of a channel's range: an isolated sample further off than that is left out before inference."""
 _GAP_STEPS = 5.0
 _WILD_SD = 12.0
-_PLATEAU_TIMES = 4.0  # a triangle spends 5 % of its time in the top 5 %; so many times that is no triangle
+_PLATEAU_TIMES = 5.0  # a triangle spends 5 % of its time in the top 5 %, a sine 20 %; so many times a triangle's is neither
 _MOST_LISTED = 20
 _FROZEN_SHARE = 0.3  # of the other channel's range passed while one stood exactly still
+_DRAG_SHARE = 0.3  # of the largest torque: drag at which clearances are crossed
+_DRAG_STEPS = 2.0  # of the usual ones: a torque that goes on so closely has missed nothing
 _HELD_SHARE, _HELD_SAMPLES, _HELD_CHANCE = 0.03, 10, 1e-6
 # The same, more than a turning point's; samples below which no channel is said to be held; expected runs of the noise alone
 
@@ -31,12 +33,13 @@ def gaps_after(time_s: np.ndarray) -> np.ndarray:
 
 
 def find_gaps(time_s: np.ndarray, torque_nm: np.ndarray) -> list[dict]:
-    """Time steps far longer than those around them, with the share of the torque range passed meanwhile."""
-    steps, span, at = np.diff(time_s), float(np.ptp(torque_nm)), gaps_after(time_s)
-    return [
-        {"at_s": float(time_s[k]), "seconds": float(steps[k]), "torque_share": float(abs(torque_nm[k + 1] - torque_nm[k]) / span)}
-        for k in at[:_MOST_LISTED]
-    ]
+    """Time steps far longer than those around them, with the share of the torque range passed meanwhile.
+
+    Of many those are listed, in the order of time, that pass most torque.
+    """
+    steps, passed, at = np.diff(time_s), np.abs(np.diff(torque_nm)) / float(np.ptp(torque_nm)), gaps_after(time_s)
+    listed = np.sort(at[np.argsort(-passed[at], kind="stable")[:_MOST_LISTED]])
+    return [{"at_s": float(time_s[k]), "seconds": float(steps[k]), "torque_share": float(passed[k])} for k in listed]
 
 
 def find_wild(values: np.ndarray, least_share: float = 0.02) -> np.ndarray:
@@ -46,8 +49,11 @@ def find_wild(values: np.ndarray, least_share: float = 0.02) -> np.ndarray:
     """
     if len(values) < 5:
         return np.zeros(len(values), bool)
-    median = median_filter(values, 5, mode="nearest")
+    median = median_filter(values, 5, mode="mirror")  # a wild first or last sample does not count twice
     off = np.abs(values - median)
+    # A record may begin or end on a steep ramp: of the step to its first sample that counts which the next steps do not have.
+    steps = np.abs(np.diff(values))
+    off[[0, -1]] = np.maximum(steps[[0, -1]] - np.maximum(steps[[1, -2]], steps[[2, -3]]), 0.0)
     usual = 1.4826 * float(np.median(off[off > 0.0])) if np.any(off > 0.0) else 0.0
     # The range is that of the medians: one spike would hide others.
     return off > max(_WILD_SD * usual, least_share * float(np.ptp(median)))
@@ -97,8 +103,33 @@ def longest_frozen(values: np.ndarray, other: np.ndarray) -> dict:
     ``chance`` bounds the expected number of runs so long in a record of a channel that stands still and has this one's noise:
     samples · P(noise stays within one quantum)^(length - 1). It is 1 or more where a quantum hides the noise.
     """
-    edges = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]))
-    run = int(np.argmax(np.diff(edges)))
+    edges = _edges_of_runs(values)
+    return _longest(values, other, edges, np.diff(edges))
+
+
+def frozen_torque(torque_nm: np.ndarray, angle_rad: np.ndarray) -> dict:
+    """As ``longest_frozen``, without the runs of a coarse torque that stands still because a clearance is crossed.
+
+    Such a run lies at the drag, no noise forbids it, and the torque goes on where it left off.
+    """
+    edges = _edges_of_runs(torque_nm)
+    steps, lengths = np.abs(np.diff(torque_nm)), np.diff(edges)
+    after = np.append(steps[edges[1:-1] - 1], np.inf)
+    usual = float(np.median(after[:-1])) if len(after) > 1 else 0.0
+    small = np.abs(torque_nm[edges[:-1]]) <= _DRAG_SHARE * np.abs(torque_nm[~find_wild(torque_nm)]).max()
+    free = len(torque_nm) * _share_in_one_quantum(torque_nm) ** (lengths - 1.0) >= _HELD_CHANCE
+    crossing = small & free & (after <= _DRAG_STEPS * usual * (1.0 + 1e-9))
+    return _longest(torque_nm, angle_rad, edges, np.where(crossing, 0, lengths))
+
+
+def _edges_of_runs(values: np.ndarray) -> np.ndarray:
+    """Where runs of equal values begin, and the end of the last."""
+    return np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]))
+
+
+def _longest(values, other, edges, lengths) -> dict:
+    """What ``longest_frozen`` tells, of the run of the largest of the ``lengths`` (runs,)."""
+    run = int(np.argmax(lengths))
     start, stop = int(edges[run]), int(edges[run + 1])
     means = [part.mean() for part in np.array_split(other[start:stop], min(20, stop - start))]
     moved = float(np.ptp(means))

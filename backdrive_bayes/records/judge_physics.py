@@ -38,7 +38,9 @@ def judge_physics(found: dict, columns: dict[str, str]):
 
 
 def judge_rated_torque(rated_nm: float, tested_nm: float):
-    """A finding where the rated torque and the largest torque tested cannot belong together."""
+    """A finding where the rated torque and the largest torque tested cannot belong together; without a ramp none was tested."""
+    if tested_nm <= 0.0:
+        return
     if not _UNTESTED_SHARE <= tested_nm / rated_nm <= _OVERLOADED_TIMES:
         times = tested_nm / rated_nm
         much = f"{times:.3g} times" if times > 1.0 else f"1/{1.0 / times:.3g} of"

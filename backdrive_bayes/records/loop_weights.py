@@ -41,7 +41,7 @@ def cycles_of(record: Record, segments) -> Cycles | None:
         return None
     ends = np.abs(record.torque_nm[[0, -1]])
     start = float(np.median(record.torque_nm[: max(3, segments[0].stop // 100)]))
-    levels = np.r_[start, turning_levels(record.torque_nm, (*segments, segments[-1]))]
+    levels = np.r_[start, turning_levels(record.time_s, record.torque_nm, (*segments, segments[-1]))]
     ramps = np.abs(np.diff(levels))
     full, amplitude = ramps >= _FULL * ramps.max(), 0.5 * float(ramps.max())
     closed = np.abs(levels[2:] - levels[:-2]) <= _CLOSED * ramps.max()

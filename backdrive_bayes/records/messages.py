@@ -27,7 +27,8 @@ def _time(found, _):
     if gaps:
         worst = max(gaps, key=lambda gap: gap["torque_share"])
         place = f"{worst['seconds']:.3g} s at {worst['at_s']:.4g} s, skips {worst['torque_share']:.1%} of the torque range"
-        text = f"{len(gaps)} gap{'s'[: len(gaps) != 1]} in time; the worst, {place}"
+        count = found["gap_count"]
+        text = f"{count} gap{'s'[: count != 1]} in time; the worst, {place}"
         yield Finding("error" if worst["torque_share"] > 0.1 else "warning", "gap", text)
     if not found["sampling"]["regular"]:
         yield Finding("note", "uneven_sampling", f"sampling is uneven (steps vary by {found['sampling']['irregularity']:.0%})")

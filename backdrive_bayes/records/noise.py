@@ -196,9 +196,11 @@ def _fit(spectra, log_time, log_time_sd):
 
     floor = centre - [12, 12, 0]
     floor[2] = np.log(min(s.step_s for s in spectra))
-    bounds = list(zip(floor, centre + [12, 12, 6], strict=True))
+    # Of steps longer than any noise lasts there is none that does.
+    top = np.maximum(centre + [12, 12, 6], floor)
+    bounds = list(zip(floor, top, strict=True))
     shifts = ((0.0, 0.0), (-1.5, -1.0), (-1.0, 1.0))
-    starts = [np.clip(centre + [a, 0, b], floor, centre + 6) for a, b in shifts]
+    starts = [np.clip(centre + [a, 0, b], floor, np.maximum(centre + 6, floor)) for a, b in shifts]
     best = min((minimize(cost, x, jac=True, method="L-BFGS-B", bounds=bounds) for x in starts), key=lambda r: r.fun).x
     low, high = np.transpose(bounds)
     for _ in range(POLISHING):

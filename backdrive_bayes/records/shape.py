@@ -7,25 +7,55 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.records.branches import Branch, Segment
+from backdrive_bayes.records.turning import block_means
 
 _FULL = 0.8  # reversals of at least this share of the largest count for the amplitude
 _TIP = 0.05  # share of the amplitude next to a tip on which its angle is read
+_RESTS = 40  # beginnings of a rest that are tried: apart by less than half a percent of the torque of a leg
+_LEG_POINTS = 1000  # block means lose nothing of a straight line
 
 
-def turning_levels(torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> np.ndarray:
+def turning_levels(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> np.ndarray:
     """Torque in N·m at the turning points, extrapolated along the segments so that noise adds no bias."""
     levels = []
     for segment in segments[:-1]:
-        part = torque_nm[segment.start : segment.stop]
-        part = part[-max(len(part) // 10, min(3, len(part))) :]
-        line = np.polyfit(np.arange(len(part)), part, 1) if len(part) > 2 else (0.0, part.mean())
-        levels.append(float(np.polyval(line, len(part) - 0.5)))
+        count = segment.stop - segment.start
+        part = slice(segment.stop - max(count // 10, min(3, count)), segment.stop)
+        levels.append(_reached(time_s[part], torque_nm[part]))
     return np.array(levels)
 
 
-def extremes(torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> tuple[float, float]:
-    """Lowest and highest torque in N·m between which the full cycles run."""
-    levels = _levels(torque_nm, segments)
+def _reached(time_s: np.ndarray, torque_nm: np.ndarray) -> float:
+    """Torque in N·m that a leg reaches, from its last part: a straight ramp up to its end, or one that then comes to rest.
+
+    A rest is believed where the squares left fall by more than two parameters are worth (Schwarz's criterion).
+    """
+    if len(time_s) < 3:
+        return float(torque_nm.mean())
+    stop = time_s[-1] + 0.5 * float(np.median(np.diff(time_s)))
+    block = max(1, len(time_s) // _LEG_POINTS)
+    time, torque = (block_means(values[len(values) % block :], block) for values in (time_s, torque_nm))
+    count = len(time)
+    rests = stop - (stop - time[0]) * np.arange(_RESTS if count > 4 else 1) / _RESTS  # the first of them is no rest
+    ramps = np.minimum(time, rests[:, None])
+    begun = ramps.mean(axis=1)
+    ramps -= begun[:, None]
+    product = ramps @ (torque - torque.mean())
+    slopes = product / np.sum(ramps**2, axis=1)
+    left = np.sum((torque - torque.mean()) ** 2) - slopes * product
+    best = int(np.argmin(left))
+    if left[best] * count ** (2.0 / max(count - 3, 1)) >= left[0]:
+        best = 0
+    return float(torque.mean() + slopes[best] * (rests[best] - begun[best]))
+
+
+def extremes(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> tuple[float, float]:
+    """Lowest and highest torque in N·m between which the full cycles run.
+
+    The record's ends are no tips: they count where they lie further out than all of these.
+    """
+    levels, (start, end) = turning_levels(time_s, torque_nm, segments), _ends(torque_nm)
+    levels = np.r_[levels, [e for e in (start, end) if not levels.size or not levels.min() <= e <= levels.max()]]
     high, low = levels.max(), levels.min()
     return (
         float(np.median(levels[levels <= low + (1 - _FULL) * abs(low)])),
@@ -50,15 +80,17 @@ def loading_rate(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segm
     return float(np.array(rates)[order][half])
 
 
-def cycle_count(torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
+def cycle_count(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
     """Torque travelled over that of one full cycle."""
-    low, high = extremes(torque_nm, segments)
-    return float(np.abs(np.diff(_levels(torque_nm, segments))).sum() / (2.0 * (high - low))) if high > low else 0.0
+    low, high = extremes(time_s, torque_nm, segments)
+    start, end = _ends(torque_nm)
+    levels = np.r_[start, turning_levels(time_s, torque_nm, segments), end]
+    return float(np.abs(np.diff(levels)).sum() / (2.0 * (high - low))) if high > low else 0.0
 
 
-def _levels(torque: np.ndarray, segments: tuple[Segment, ...]) -> np.ndarray:
-    """Torque at the record's start, its turning points and its end."""
-    return np.r_[np.median(torque[:5]), turning_levels(torque, segments), np.median(torque[-5:])]
+def _ends(torque: np.ndarray) -> tuple[float, float]:
+    """Torque at the record's start and end."""
+    return float(np.median(torque[:5])), float(np.median(torque[-5:]))
 
 
 def closure(time_s, torque_nm, angle_rad, branches: tuple[Branch, ...], noise) -> dict | None:

@@ -91,7 +91,7 @@ def _tips(record, segments, time, torque, weight) -> list[int]:
     """Knots at which legs begin and end: between the middles of two, where the torque is best taken as going one way up to there
     and back from there. The farthest need not be it, for where a clearance is crossed a drive surges and rings beyond the tip. So
     are those of the first and the last leg, for a record may begin or end with a bit of another, too short for one of its own."""
-    middle = [record.time_s[(s.start + s.stop - 1) // 2] for s in segments]
+    middle = [record.time_s[_middle(record, s)] for s in segments]
     first = max(int(np.searchsorted(time, middle[0])), 1)
     found = [_mode(-segments[0].direction * torque[:first], weight[:first])]
     for s, begin, end in zip(segments, middle, [*middle[1:], np.inf], strict=True):
@@ -100,6 +100,12 @@ def _tips(record, segments, time, torque, weight) -> list[int]:
         own = slice(first, max(last, first + 1))
         found.append(int(first + _mode(s.direction * torque[own], weight[own])))
     return found
+
+
+def _middle(record, segment) -> int:
+    """The sample at which a leg has passed half of its torque, however long it rests at its end."""
+    height = segment.direction * record.torque_nm[segment.start : segment.stop]
+    return min(segment.start + int(np.count_nonzero(height < 0.5 * (height.min() + height.max()))), segment.stop - 1)
 
 
 def _mode(height, weight) -> int:

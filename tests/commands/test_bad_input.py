@@ -306,7 +306,7 @@ def test_force_goes_on_and_says_so(unit_folder, capsys):
 
 
 def test_warnings_are_repeated_and_kept(unit_folder, capsys):
-    edit_toml(unit_folder, "= 1.0", "= 100.0")
+    edit_toml(unit_folder, "= 1.0", "= 150.0")
     ready = ready_unit(unit_folder)
     said = capsys.readouterr().out
     assert "warning: the largest torque tested" in said and "lost motion is not defined" in said

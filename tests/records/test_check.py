@@ -5,7 +5,7 @@ import pytest
 from conftest import answer, ramps
 
 from backdrive_bayes.records.check import check_unit
-from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild, without_wild
+from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild, longest_frozen, without_wild
 from backdrive_bayes.records.record import Record, Unit
 
 ARCMIN = np.pi / 10800
@@ -58,6 +58,11 @@ def test_plateau_is_seen():
     assert "clipped, saturated or dwells" in texts(result, "warning")
 
 
+def test_a_sine_has_no_plateau():
+    time = np.arange(0.0, 25.0, 0.01)
+    assert "dwells" not in texts(judged(time, np.sin(0.5 * time))[0], "warning")
+
+
 def test_gap_is_an_error_when_it_skips_much_torque():
     time, torque = ramps(noise=0.002)
     for skipped, level in ((slice(300, 310), "warning"), (slice(300, 400), "error")):
@@ -68,12 +73,35 @@ def test_gap_is_an_error_when_it_skips_much_torque():
         assert result["may_infer"] == (level == "warning")
 
 
+def test_of_many_gaps_the_widest_is_judged_and_all_are_counted():
+    """The planted fault is to look at the first twenty."""
+    time, torque = ramps(noise=0.002, hertz=2000)
+    starts = np.arange(200, 7800, 250)
+    keep = np.delete(np.arange(len(time)), np.r_[np.add.outer(starts, np.arange(12)).ravel(), 8500:9300])
+    result, record = judged(time[keep], torque[keep])
+    assert record["gap_count"] == len(starts) + 1 and len(record["gaps"]) == 20
+    assert f"{len(starts) + 1} gaps in time; the worst, 0.4" in texts(result, "error")
+    assert np.all(np.diff([gap["at_s"] for gap in record["gaps"]]) > 0)
+
+
 def test_drop_outs_are_counted():
     time, torque = ramps(noise=0.002)
     torque[[150, 333, 700]] = 0.0
     result, record = judged(time, torque)
     assert record["drop_outs"]["torque"] == 3
     assert "3 isolated torque samples" in texts(result, "warning")
+
+
+@pytest.mark.parametrize("at", [0, 1, -2, -1])
+def test_a_zero_in_the_first_or_last_row_is_a_wild_sample(at):
+    time, torque = ramps(noise=0.002)
+    angle = answer(torque) + 0.3
+    for steep in (angle, torque, torque[:190], torque[:190] ** 3, np.sqrt(np.arange(60.0))):
+        assert not find_wild(steep).any(), "a record may begin or end on a ramp"
+    angle[at] = 0.0
+    assert np.flatnonzero(find_wild(angle)).tolist() == [at % len(angle)]
+    (left,) = without_wild(Unit("u", 1.0, (Record("r.csv", time, torque, angle),))).records
+    assert left.angle_rad.min() > 0.2
 
 
 def test_one_wild_sample_changes_neither_signs_nor_jumps_nor_the_measured_loop():
@@ -131,6 +159,40 @@ def test_a_dwell_of_torque_and_angle_alike_is_no_fault_of_the_encoder():
     angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
     torque[450:550], angle[450:550] = torque[450], angle[450]
     assert "stands still" not in texts(judged(time, torque, angle, noise=0.0)[0], "warning")
+
+
+def by_position(noise=0.1, clearance=0.5):
+    """A bench that turns the output steadily through a clearance, with its torque printed to 1 mN·m of 100."""
+    time, turned = ramps((0, 1, -1, 1, 0), rate=0.1)
+    free = np.sign(turned) * np.maximum(np.abs(turned) - clearance, 0.0) / (1.0 - clearance)
+    drag = 4.0 * np.sign(np.gradient(turned))
+    steps = 100.0 * free + drag + noise * np.random.default_rng(0).normal(size=len(time))
+    return time, 1e-3 * np.round(steps), np.radians(turned)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize("clearance", [0.4, 0.5])
+def test_a_coarse_torque_that_stands_still_across_a_clearance_is_sound(noise, clearance):
+    time, torque, angle = by_position(noise, clearance)
+    result, record = judged(time, torque, angle, noise=0.004, rated=0.1)
+    assert longest_frozen(torque, angle)["other_share"] > 0.3, "the clearance is long enough to look like a frozen channel"
+    assert result["may_infer"] and "stands still" not in texts(result, "warning")
+
+
+@pytest.mark.parametrize("frozen", [slice(2450, 4500), slice(2600, 4200), slice(4000, 5400), slice(3900, 6600)])
+def test_a_coarse_torque_that_freezes_on_a_ramp_stays_an_error(frozen):
+    """Frozen on the ramp before the clearance, within it and on beyond it, or over a tip: it has missed torque."""
+    time, torque, angle = by_position()
+    torque[frozen] = torque[frozen.start]
+    result, _ = judged(time, torque, angle, noise=0.004, rated=0.1)
+    assert "torque stands still for" in texts(result, "error") and not result["may_infer"]
+
+
+def test_a_fine_torque_that_stands_still_at_the_drag_is_frozen():
+    time, torque, angle = by_position()
+    torque += 1e-4 * np.random.default_rng(2).normal(size=len(time))
+    torque[4000:5800] = torque[4000]
+    assert "torque stands still" in texts(judged(time, torque, angle, noise=0.004, rated=0.1)[0], "error")
 
 
 def test_angle_lost_in_noise_speaks_against_inference():

@@ -56,6 +56,14 @@ def test_preamble_units_and_header(tmp_path):
     reads_true(text(tmp_path, *lines), "3 lines above the header left out")
 
 
+@pytest.mark.parametrize(
+    ("decimal", "other"), [(",", "03.05.2024 10:00:00.000"), (",", "v1.2.3.4.5"), (".", '"a, b, c, d, e"'), (".", "1,5,2,5")]
+)
+def test_dates_and_comments_do_not_tell_the_decimal_mark(tmp_path, decimal, other):
+    lines = ["Datum;Zeit [s];Drehmoment [mNm];Winkel [°]", *(f"{other};{row}" for row in rows(";", decimal))]
+    reads_true(text(tmp_path, *lines), *GERMAN)
+
+
 def test_rows_are_counted_with_the_preamble(tmp_path):
     lines = ["bench 3", "", "time [s],torque [mNm],angle [deg]", *rows()]
     lines[40] = lines[40].replace(".", "x", 1)
@@ -169,6 +177,18 @@ def test_tdms_waveforms_bring_time_and_units(tmp_path, key):
     torque = ("bench", "Drehmoment", 1e3 * TORQUE, STEP | {key: "mNm"})
     path = tdms(tmp_path / "r.tdms", torque, ("bench", "Winkel", DEG, STEP | {key: "°"}))
     reads_true(path, "waveforms' properties", "read 'Drehmoment [mNm]' as torque in mN·m")
+
+
+@pytest.mark.parametrize("late", [0, 100])
+def test_tdms_waveforms_that_start_apart_are_laid_on_one_clock(tmp_path, late):
+    """The later channel's first sample belongs to its own start. The planted fault is a channel that does not tell when."""
+    start = np.datetime64("2024-05-03T10:00:00")
+    began = {"wf_start_time": start + np.timedelta64(5 * late, "ms")}
+    torque = ("bench", "M [mNm]", 1e3 * TORQUE, STEP | {"wf_start_time": start})
+    told = read_unit(tdms(tmp_path / "a.tdms", torque, ("bench", "phi [deg]", DEG[late:], STEP | began))).records[0]
+    silent = read_unit(tdms(tmp_path / "b.tdms", torque, ("bench", "phi [deg]", DEG[late:], STEP))).records[0]
+    assert told.torque_nm == pytest.approx(TORQUE[late:], abs=1e-6) and told.angle_rad == pytest.approx(ANGLE[late:], abs=1e-8)
+    assert (np.abs(silent.torque_nm - TORQUE[late:]).max() > 0.1) == (late > 0)
 
 
 def test_tdms_of_two_groups_with_a_clock_each(tmp_path):

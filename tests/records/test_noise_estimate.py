@@ -154,3 +154,14 @@ def test_noise_lasts_for_a_time_or_for_samples(in_samples, monkeypatch):
     assert 0.5 < slow(estimate_common_noise(records)) < 2.0
     monkeypatch.setattr(noise, "ALIKE", np.inf)
     assert (slow(estimate_common_noise(records)) < 0.5) is in_samples
+
+
+@pytest.mark.parametrize("step_s", [5.0, 20.0, 300.0])
+def test_records_read_less_often_than_noise_lasts_have_a_noise(step_s):
+    """Dead weights put on by hand: no bound of the noise's duration lies below the step from sample to sample."""
+    rng = np.random.default_rng(3)
+    torque = np.repeat(np.r_[np.arange(0, 9), np.arange(7, -9, -1), np.arange(-7, 9)] / 8.0, 5)
+    time = step_s * np.arange(torque.size)
+    angle = 1e-3 * torque + 1e-5 * rng.standard_normal(torque.size)
+    found = estimate_noise(time, torque + 1e-4 * rng.standard_normal(torque.size), angle, find_segments(time, torque))
+    assert np.hypot(found.white_rad, found.correlated_rad) == pytest.approx(1e-5, rel=0.4)

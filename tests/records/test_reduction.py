@@ -182,6 +182,26 @@ def test_the_ringing_of_a_drive_is_no_tip(monkeypatch):
     assert reached() > 0.3
 
 
+def test_a_tip_before_a_long_hold_is_found(monkeypatch):
+    """A servo lets go a little when it stops, and holds for longer than it has ramped. The planted fault looks for a tip from the
+    middle of a leg's samples on, which lies in the hold."""
+    levels, spans = [0.0], []
+    for sign in (1, -1, 1):
+        levels += [sign, 0.96 * sign, 0.96 * sign]
+        spans += [abs(sign - levels[-4]) / 0.5, 0.2, 20.0]
+    ends = np.cumsum([0.0, *spans, 1.8])
+    time = np.arange(0.0, ends[-1], 1 / 200.0)
+    torque = np.interp(time, ends, [*levels, 0.0])
+
+    def missed():
+        blocks = reduce_unit(turned(torque, time)).blocks[0]
+        return np.abs(blocks.turning_nm - [0.0, 1.0, -1.0, 1.0, 0.0]).max()
+
+    assert missed() < 0.01
+    monkeypatch.setattr(torque_path, "_middle", lambda record, s: (s.start + s.stop - 1) // 2)
+    assert missed() > 0.02
+
+
 def test_short_rests_between_fast_rises_are_followed(monkeypatch):
     """Dead weights put on by hand: lines that rest are joined by what was read between, not where they would meet. The planted
     fault joins them wherever that is."""

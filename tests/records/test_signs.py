@@ -5,6 +5,7 @@ import pytest
 from conftest import answer, ramps, write_csv
 
 from backdrive_bayes.records.check import check_unit
+from backdrive_bayes.records.judge_physics import judge_rated_torque
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.unit_folder import read_unit
 
@@ -106,10 +107,10 @@ def test_an_angle_in_another_unit_is_a_warning_with_what_reducers_do(times, word
     assert words in text and "0.1′ to 30°: wrong unit?" in text
 
 
-@pytest.mark.parametrize("rated, words", [(1e-3, ["996 times", "0.001 N·m"]), (1e12, ["1/1e+12", "1e+12 N·m"])])
+@pytest.mark.parametrize("rated, words", [(1e-3, ["998 times", "0.001 N·m"]), (1e12, ["1/1e+12", "1e+12 N·m"])])
 def test_an_absurd_rated_torque_is_a_warning_with_both_numbers(rated, words):
     text = codes("warning", rated=rated)["rated_torque"]
-    assert "0.996 N·m" in text and all(word in text for word in words)
+    assert "0.9981 N·m" in text and all(word in text for word in words)
 
 
 def test_lost_motion_that_is_not_defined_is_said():
@@ -122,6 +123,13 @@ def test_lost_motion_that_is_not_defined_is_said():
 @pytest.mark.parametrize("part", [slice(0, 400), slice(200, 600), slice(0, 190)])
 def test_less_than_a_cycle_is_an_error(part):
     assert "no_cycle" in codes("error", TORQUE[part], ANGLE[part], TIME[part])
+
+
+def test_a_torque_that_is_held_and_then_let_go_is_an_error_and_no_crash():
+    time = np.arange(0.0, 16.0, 0.01)
+    torque = np.interp(time, [0.0, 15.0, 16.0], [1.0, 1.0, 0.9])
+    assert "no_cycle" in codes("error", torque, 0.01 * torque, time)
+    assert list(judge_rated_torque(1.0, 0.0)) == []
 
 
 @pytest.mark.parametrize("samples", [24, 30, 45])

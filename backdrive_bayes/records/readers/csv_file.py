@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +48,9 @@ def read(path: Path, choose: Choose) -> Columns:
     goes through the C parser in bounded chunks; only when that fails is the file searched line by line for
     the culprit.
     """
-    dialect = _sniff(path)
+    dialect, lines = _sniff(path)
     wanted = list(choose(dialect.headers))
+    dialect = replace(dialect, decimal=_decimal(dialect, lines, wanted))
     try:
         values, even = _parse(path, dialect, wanted)
     except BadInput:
@@ -104,7 +105,18 @@ def _without_trailing_blanks(values: list[np.ndarray]) -> list[np.ndarray]:
     return [value[: filled[-1] + 1 if filled.size else 0] for value in values]
 
 
-def _sniff(path: Path) -> Dialect:
+def _decimal(dialect: Dialect, lines: list[str], wanted: list[str]) -> str:
+    """Decimal mark of the columns that are read; dates and comments have marks of their own."""
+    if dialect.separator == ",":
+        return "."
+    positions = {dialect.headers.index(name) for name in wanted}
+    rows = csv.reader(lines, delimiter=dialect.separator)
+    read = "".join(cell for row in rows for position, cell in enumerate(row) if position in positions)
+    return "," if read.count(",") > read.count(".") else "."
+
+
+def _sniff(path: Path) -> tuple[Dialect, list[str]]:
+    """How a file is written, decimal points assumed, and the first lines of its samples."""
     with BoundedStream(path) as stream:
         head = io.BufferedReader(stream, _HEAD_BYTES).read(_HEAD_BYTES)
     encoding, notes = _encoding(path, head)
@@ -119,10 +131,9 @@ def _sniff(path: Path) -> Dialect:
     first = next(csv.reader([lines[found.first_row]], delimiter=separator), [])
     if any(first[len(found.names) :]):
         raise too_long(f"{path}, row {found.first_row + 1}", separator, len(found.names), len(first))
-    body = "".join(lines[found.first_row :])
-    decimal = "," if separator != "," and body.count(",") > body.count(".") else "."
     marks = sum(line.count(separator) for line in lines[: found.first_row])
-    return Dialect(encoding, separator, decimal, found.names, notes + found.notes, found.first_row, marks)
+    dialect = Dialect(encoding, separator, ".", found.names, notes + found.notes, found.first_row, marks)
+    return dialect, lines[found.first_row :]
 
 
 def _table(path: Path, lines: list[str]) -> tuple[str, TableHead]:

@@ -14,6 +14,7 @@ from backdrive_bayes.records.readers.clocks import TIME_HEADER, Signal, on_one_c
 from backdrive_bayes.records.readers.limits import Choose, Columns, check_rows, finite_columns, silence
 
 _UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
+_NO_START = np.datetime64("1904-01-02")  # LabVIEW's clock begins a day before: the start of waveforms that have none
 
 
 def read(path: Path, choose: Choose) -> Columns:
@@ -51,7 +52,8 @@ def _read_channels(path: Path, channels: dict, file, choose: Choose) -> Columns:
             check_rows(path, len(channels[name]))
     if wanted[0] != TIME_HEADER or not own_clock:
         return finite_columns(path, wanted, [channels[name][:] for name in wanted])
-    signals = [_signal(path, name, channels[name], clocks) for name in wanted[1:]]
+    starts = _starts([channels[name] for name in wanted[1:]], clocks)
+    signals = [_signal(path, name, channels[name], clocks, start) for name, start in zip(wanted[1:], starts, strict=True)]
     note = "time is that of the groups' own channels" if times else "time is that of the waveforms' properties"
     return on_one_clock(path, signals, note)
 
@@ -81,14 +83,29 @@ def _clock_of(group):
     return next((c for c in group.channels() if c.properties.get("wf_increment")), None)
 
 
-def _signal(path: Path, name: str, channel, clocks) -> Signal:
+def _source(channel, clocks):
+    """The channel that holds the times of another or the properties of its waveform, or None."""
     clock = clocks.get(channel.group_name)
     own = channel if channel.properties.get("wf_increment") else None
-    source = clock if clock is not None and _is_time(_label("", clock, False)) else own or clock
+    return clock if clock is not None and _is_time(_label("", clock, False)) else own or clock
+
+
+def _starts(channels, clocks) -> np.ndarray:
+    """Seconds by which each waveform starts after the earliest, none where not all of them tell when."""
+    sources = [_source(channel, clocks) for channel in channels]
+    told = [s.properties.get("wf_start_time") if s is not None and s.properties.get("wf_increment") else None for s in sources]
+    if not all(isinstance(start, np.datetime64) and start > _NO_START for start in told):
+        return np.zeros(len(channels))
+    starts = np.array(told, "datetime64[us]")
+    return (starts - starts.min()) / np.timedelta64(1, "s")
+
+
+def _signal(path: Path, name: str, channel, clocks, start_s: float) -> Signal:
+    source = _source(channel, clocks)
     if source is None:
         raise BadInput(f"{path}, channel '{name}'", "a time channel in its group, or wf_increment", "neither")
     if source is channel or source.properties.get("wf_increment"):
-        return Signal(name, _waveform_times(path, name, source, len(channel)), channel[:])
+        return Signal(name, start_s + _waveform_times(path, name, source, len(channel)), channel[:])
     check_rows(path, len(source))
     return Signal(name, _seconds(source), channel[:])
 
