@@ -16,7 +16,7 @@ from backdrive_bayes.decisions.conformance import (
     share,
 )
 from backdrive_bayes.decisions.evidence import Evidence
-from backdrive_bayes.decisions.global_risk import global_risks, process_of_batch
+from backdrive_bayes.decisions.global_risk import global_risks, process_of_units
 from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.decisions.loops import Loop, NotAvailable, find_loop, largest_loops
 from backdrive_bayes.decisions.next_step import advice, repeats_to_settle
@@ -28,9 +28,6 @@ from backdrive_bayes.indicators.draws import UNITS
 from backdrive_bayes.results import VERDICT
 
 BINS = 60
-FEWEST_UNITS = 3
-ENERGIES = ("loop_area_J", "absorbed_J")
-"""Indicators that are integrals of the angle over the torque."""
 _EXPLAIN = "Fit with the effects that the diagnosis names, or give their models with --model."
 
 
@@ -132,17 +129,21 @@ def _together(structure, judged) -> list[float]:
 def _within(structure: Structure, judged: Judged) -> float:
     """Largest probability that a limit is kept where something acts that no model holds.
 
-    Whatever acts, it was measured: an angle that differs from a model's by the gap, with root mean square g over the torque,
-    encloses at most 4 T g more or less in a loop of amplitude T (Cauchy-Schwarz), and g in one of R records is at most √R times
-    that of all. Other indicators, loops that were not measured, and what a diagnosis without a verdict leaves, may be anything.
+    Whatever acts was measured in S of a measured loop; other indicators, loops that were not measured, and what a diagnosis
+    without a verdict leaves, may be anything.
     """
     diagnosis = structure.models[0].evidence.diagnosis or {}
     gap = {} if diagnosis.get("inconclusive") else diagnosis.get("gap") or {}
-    if judged.loop.predicted or judged.limit.indicator not in ENERGIES or not gap.get("rms_rad"):
+    if judged.loop.predicted or judged.limit.indicator != "loop_area_J" or not gap.get("rms_rad"):
         return 1.0
-    records = len(structure.models[0].evidence.about["records"])
-    worth = 4.0 * judged.loop.amplitude * gap["rms_rad"] * np.sqrt(records)
+    worth = largest_enclosed_j(gap["rms_rad"], judged.loop.amplitude, structure.models[0].evidence.draws.travelled_nm)
     return max(conformance_probability(v, judged.limit.lo - worth, judged.limit.hi + worth) for v in judged.values)
+
+
+def largest_enclosed_j(gap_rad: float, amplitude_nm: float, travelled_nm: float) -> float:
+    """By how much the area of a loop can differ [J] where the angle differs by a root mean square ``gap_rad`` over the torque
+    that all records travel, the loop among them (Cauchy and Schwarz): |∮ Δθ dτ| ≤ √(4 T ∮ Δθ² |dτ|) ≤ γ √(4 T L)."""
+    return float(gap_rad * np.sqrt(4.0 * amplitude_nm * travelled_nm))
 
 
 def _verdict(structure: Structure, risks: Risks, limits: Limits) -> tuple[Verdict, str]:
@@ -196,11 +197,20 @@ def _row(structure: Structure, judged: Judged, within: float, limits: Limits, ba
         "specific_producer_risk": risks.producer,
         "verdict": risks.verdict(limits.consumer, limits.producer).value if first.converged else Verdict.INCONCLUSIVE.value,
         "guard_band": {"below_max": upper, "above_min": lower},
-        "accept_median_between": [limit.lo + lower, limit.hi - upper],
+        "accept_median_between": _accepted(limit, mixed, limits.consumer),
         "naive": _naive(first, limit, loop),
         "histogram": _histogram(mixed),
     }
-    return row | {"global": _global(row, limit, limits, batch, first.about["k"] * first.rated_torque, level)}
+    return row | {"global": _global(row, first, limit, limits, batch)}
+
+
+def _accepted(limit: Limit, values, consumer: float) -> list[float]:
+    """Medians between which the draws would be accepted if they were moved as a whole, none where no median is; of two limits by
+    the normal of their spread."""
+    if np.isinf([limit.lo, limit.hi]).any():
+        upper, lower = guard_bands(values, consumer)
+        return [limit.lo + lower, limit.hi - upper]
+    return list(acceptance_interval(float(np.std(values)) or 1e-300, limit.lo, limit.hi, 1 - consumer) or ())
 
 
 def _mixture(structure, values, draws: int = 4000):
@@ -226,7 +236,7 @@ def _naive(evidence: Evidence, limit: Limit, loop: Loop) -> dict:
     return {"value": value, "inside": None if value is None else bool(limit.lo <= value <= limit.hi)}
 
 
-def _global(row, limit: Limit, limits: Limits, batch, lost_motion_at: float, level: float) -> dict | None:
+def _global(row, first: Evidence, limit: Limit, limits: Limits, batch) -> dict | None:
     """Global risks of this decision rule over units of the process, measured as this one was."""
     if (limit.process is None and not batch) or row["sd"] <= 0:
         return None
@@ -235,26 +245,14 @@ def _global(row, limit: Limit, limits: Limits, batch, lost_motion_at: float, lev
     kept = acceptance_interval(row["sd"], limit.lo, limit.hi, limits.producer) or (np.inf, -np.inf)
     rule = row["sd"], (limit.lo, limit.hi), accepted, kept
     if limit.process is None and isinstance(batch, Pool):
-        pooled = batch.predictive(limit.indicator, row["loading_rate_Nm_per_s"], row["amplitude_Nm"], lost_motion_at)
-        told, units, found = pooled.to_json(), pooled.units, pooled.risks(*rule, level)
+        taken = first.about["k"] * first.rated_torque
+        pooled = batch.predictive(limit.indicator, row["loading_rate_Nm_per_s"], row["amplitude_Nm"], taken)
+        told, units, found = pooled.to_json(), pooled.units, pooled.risks(*rule, first.about["level"])
     else:
-        process, units = (limit.process, 0) if limit.process else _process(limit, row, batch)
+        at = row["loading_rate_Nm_per_s"], row["amplitude_Nm"]
+        process, units = (limit.process, 0) if limit.process else process_of_units(first, batch, limit.indicator, *at)
         told, found = process.to_json(), global_risks(process, *rule).to_json()
     return {"process": told, "batch_units": units, "uncertainty": row["sd"], "accepted": accepted} | found
-
-
-def _process(limit, row, batch):
-    estimates, spreads = [], []
-    for other in batch:
-        try:
-            values = other.values(limit.indicator, other.loop(row["loading_rate_Nm_per_s"], row["amplitude_Nm"]))
-        except NotAvailable as why:
-            raise BadInput(other.where, f"{limit.indicator} of the batch's unit", str(why)) from None
-        estimates.append(float(np.median(values)))
-        spreads.append(float(np.std(values)))
-    if len(estimates) < FEWEST_UNITS:
-        raise BadInput("batch", f"at least {FEWEST_UNITS} other units", f"{len(estimates)}")
-    return process_of_batch(estimates, spreads), len(estimates)
 
 
 def _next(structure: Structure, verdict: Verdict, rows: list[dict], limiting: int, limits: Limits) -> dict | None:

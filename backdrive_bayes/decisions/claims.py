@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
-from backdrive_bayes.decisions.expression import Expression, Wrong
+from backdrive_bayes.decisions.evidence import Evidence, same_load, same_lost_motion
+from backdrive_bayes.decisions.expression import PLACE, Expression, Wrong
 from backdrive_bayes.decisions.loops import NotAvailable
 from backdrive_bayes.decisions.quantities import Quantities
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.indicators.draws import LOADED
 from backdrive_bayes.indicators.same_loop import same_rate
 from backdrive_bayes.schemas.claims_file import ClaimsFile, ClaimTable
 from backdrive_bayes.schemas.toml_file import read_typed
@@ -95,6 +96,8 @@ def _ask(claim, units, quantities):
     """Draws of the answer (draws,), and the numbers behind it."""
     same_lost_motion([units[u] for u in claim.holds.asked_of("lost_motion_rad")])
     rates = _rates(claim, units)
+    loaded = [units[u] for u in {u for name in LOADED for u in claim.holds.asked_of(name)}]
+    same_load(loaded, [e.loop(e.rates[-1], claim.amplitude).amplitude for e in loaded])
     contexts = [rates] if claim.along == "rate" else [[r] for r in (rates if claim.every == "rate" else [_one(claim, rates)])]
     held, numbers = [], []
     for context in contexts:
@@ -110,11 +113,14 @@ def _ask(claim, units, quantities):
     sizes = {h.size for h in held}
     if len(sizes) > 1:
         raise Wrong("quantities of different kinds cannot be combined in one claim")
+    if claim.is_probability and not all(np.all((0.0 <= h) & (h <= 1.0)) for h in held):
+        raise Wrong("expected a probability, found a number that is not between 0 and 1")
     return (np.mean if claim.is_probability else np.logical_and.reduce)(held, axis=0), numbers
 
 
 def _number(claim, part, look_up, along, where):
     text, node, unit = part
+    unit = ("N·m/s" if claim.along == "rate" else "N·m") if unit == PLACE else unit
     value = np.atleast_2d(np.asarray(claim.holds.run_part(node, look_up, along), float).T).T
     if not np.isfinite(value).all():
         # A comparison with NaN would be false and look like an answer.

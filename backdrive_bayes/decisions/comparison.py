@@ -9,11 +9,11 @@ import numpy as np
 
 from backdrive_bayes.decisions.claims import Claims, answer
 from backdrive_bayes.decisions.conformance import share
-from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
+from backdrive_bayes.decisions.evidence import Evidence, same_load, same_lost_motion
 from backdrive_bayes.decisions.loops import Loop, NotAvailable
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.indicators.draws import UNITS
+from backdrive_bayes.indicators.draws import LOADED, UNITS
 from backdrive_bayes.indicators.intervals import central
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 from backdrive_bayes.results import COMPARISON
@@ -120,6 +120,8 @@ def _indicators(a, b, matched, rope, level, rng):
         try:
             if name == "lost_motion_rad":
                 same_lost_motion([a, b])
+            if name in LOADED:
+                same_load([a, b], [matched.first.amplitude, matched.second.amplitude])
             first, second = a.values(name, matched.first), b.values(name, matched.second)
         except NotAvailable as why:
             left_out[name] = str(why)

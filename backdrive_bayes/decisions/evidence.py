@@ -46,6 +46,10 @@ class Draws(Protocol):
         """The rated torque T_r."""
 
     @property
+    def travelled_nm(self) -> float:
+        """Torque that all records travel, up and down [N·m]."""
+
+    @property
     def kept(self) -> np.ndarray:
         """Numbers of the kept draws."""
 
@@ -72,6 +76,14 @@ def same_lost_motion(evidences) -> None:
     if any(not same_amplitude(taken[0], t) for t in taken[1:]):
         shown = " and ".join(f"±{t:.3g} N·m" for t in taken)
         raise NotAvailable(f"lost motion was taken at {shown}: give the same k·T_r")
+
+
+def same_load(evidences, amplitudes) -> None:
+    """Raise NotAvailable where the loads that arrive on loops of those amplitudes [N·m], one a unit, differ: a load is as large
+    as the amplitude, but no larger than the rated torque."""
+    loads = [min(e.rated_torque, a) for e, a in zip(evidences, amplitudes, strict=True)]
+    if any(not same_amplitude(loads[0], load) for load in loads[1:]):
+        raise NotAvailable(f"loads are {' and '.join(f'{load:.3g} N·m' for load in loads)}: ask at one amplitude within both T_r")
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,6 +44,8 @@ _SYMBOLS = {ast.Lt: "<", ast.LtE: "≤", ast.Gt: ">", ast.GtE: "≥"}
 _PLAIN = ("spread", "ratio_of_extremes", "linearity", "log_slope")
 _OTHER_UNITS = {"width_rad": "rad", "effect": "1", "sensitivity": "1", "least_squares": "1", "amplitude_Nm": "N·m"}
 _PLACES = ("at_lowest", "at_highest")
+PLACE = "along"
+"""The unit of what tells where: that of the series' own coordinate."""
 _TRUTHS = ("rises", "falls", "one_valley", "double_humped")
 
 
@@ -206,7 +208,7 @@ def _unit(node) -> str:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         if node.func.id in _PLAIN:
             return "1"
-        return "N·m" if node.func.id in _PLACES else _unit(node.args[0])
+        return PLACE if node.func.id in _PLACES else _unit(node.args[0])
     if isinstance(node, ast.Call):
         return _unit_of_parameter(node) if getattr(node.func, "attr", "") == "parameter" else _unit(node.func)
     if isinstance(node, ast.Attribute):

@@ -8,7 +8,13 @@ from functools import cached_property
 import numpy as np
 from scipy import stats
 
+from backdrive_bayes.decisions.evidence import Evidence, same_lost_motion
+from backdrive_bayes.decisions.loops import NotAvailable
+from backdrive_bayes.errors import BadInput
+
 SHAPES = ("normal", "lognormal", "gamma")
+FEWEST_UNITS = 3
+"""Of which a mean and a standard deviation are made."""
 NODES, PIECES = 40, 24
 REACH = 9.0
 """Standard deviations beyond which nothing is integrated."""
@@ -72,6 +78,27 @@ def global_risks(process: Process, uncertainty: float, limit, accepted, rejected
         _mass(inside + outside, process, uncertainty, accepted),
         _mass(inside + outside, process, uncertainty, rejected_outside, complement=True),
     )
+
+
+def process_of_units(first: Evidence, others, indicator: str, rate: float, amplitude: float) -> tuple[Process, int]:
+    """The process of ``others`` like the unit ``first``, by an indicator of a loop, and their number; BadInput where one is there
+    twice, was taken at another torque, or where they are too few."""
+    estimates, spreads, seen = [], [], [first.about["data_sha256"]]
+    for other in others:
+        if other.about["data_sha256"] in seen:
+            raise BadInput(other.where, "other units in the batch, each once", f"the data of {other.name} once more")
+        seen.append(other.about["data_sha256"])
+        try:
+            if indicator == "lost_motion_rad":
+                same_lost_motion([first, other])
+            values = other.values(indicator, other.loop(rate, amplitude))
+        except NotAvailable as why:
+            raise BadInput(other.where, f"{indicator} of the batch's unit", str(why)) from None
+        estimates.append(float(np.median(values)))
+        spreads.append(float(np.std(values)))
+    if len(estimates) < FEWEST_UNITS:
+        raise BadInput("batch", f"at least {FEWEST_UNITS} other units", f"{len(estimates)}")
+    return process_of_batch(estimates, spreads), len(estimates)
 
 
 def process_of_batch(estimates, uncertainties) -> Process:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 
 SMALLEST = 0.05
 """Smallest amplitude that is predicted, as a share of the measured one."""
-
+ROUNDING = 1e-9
 
 
 class NotAvailable(Exception):
@@ -67,7 +67,8 @@ def largest_loops(measured) -> list[Loop]:
 def find_loop(measured, rate: float, amplitude: float | None = None) -> Loop:
     """The loop of that rate and amplitude (the largest measured one by default), predicted where it must be.
 
-    Raises NotAvailable for a rate that was not measured, and for an amplitude beyond the measured one or far below it.
+    A measured loop counts where its amplitude is about the asked one, at which it is then evaluated. Raises NotAvailable for a
+    rate that was not measured, and for an amplitude beyond the measured one or far below it.
     """
     at_rate = [x for x in measured if same_rate(x.rate, rate)]
     if not at_rate:
@@ -78,11 +79,11 @@ def find_loop(measured, rate: float, amplitude: float | None = None) -> Loop:
         return top
     exact = [x for x in at_rate if same_amplitude(x.amplitude, amplitude)]
     if exact:
-        return min(exact, key=lambda x: abs(x.amplitude - amplitude))
+        return replace(min(exact, key=lambda x: abs(x.amplitude - amplitude)), amplitude=float(amplitude))
     if amplitude > top.amplitude:
         most = f"{top.amplitude:.3g} N·m at {top.rate:.3g} N·m/s"
         raise NotAvailable(f"amplitude {amplitude:.3g} N·m lies beyond the measured {most}")
     lowest = top.amplitude * SMALLEST
-    if amplitude < lowest:
+    if amplitude < lowest * (1 - ROUNDING):
         raise NotAvailable(f"amplitude {amplitude:.3g} N·m is below {lowest:.3g} N·m, the smallest that is predicted")
     return Loop(top.rate, float(amplitude), top.records, True)

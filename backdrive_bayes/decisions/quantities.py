@@ -78,10 +78,12 @@ class Quantities:
             raise NotAvailable(f"{name} is not known along the amplitude")
         # All amplitudes from one record, so that steps between records are no part of the series.
         top = evidence.loop(keywords.get("rate", rates[0]))
-        loops = [Loop(top.rate, float(t), top.records, True) for t in np.minimum(along, top.amplitude)]
+        loops = [Loop(top.rate, evidence.loop(top.rate, float(t)).amplitude, top.records, True) for t in along]
         return np.stack([evidence.values(name, x)[order] for x in loops], axis=1)
 
     def _width(self, evidence, order, loop: Loop, keywords, along, claim):
+        if claim.along == "torque":
+            loop = evidence.loop(loop.rate, max(loop.amplitude, float(np.abs(along).max())))
         torque = _curve_torques(evidence, loop)
         width = evidence.draws.widths(loop.rate, loop.amplitude)
         if "torque" in keywords or claim.along != "torque":
@@ -139,8 +141,11 @@ def _effect(evidence, arguments) -> float:
         raise Wrong("expected effect('name')")
     if evidence.diagnosis is None:
         raise NotAvailable(f"no diagnosis.json beside the fit of {evidence.name}: diagnose it first")
-    found = {w.get("effect"): w.get("probability") for w in evidence.diagnosis.get("which", [])}
-    if not isinstance(found.get(arguments[0]), int | float):
+    if evidence.diagnosis.get("simulator"):
+        raise NotAvailable(f"the diagnosis of {evidence.name} tells what a simulator lacks: diagnose it without one")
+    # Of a name alone and beside others.
+    found = [w["probability"] for w in evidence.diagnosis.get("which", []) if arguments[0] in w["effect"].split("+")]
+    if not found:
         raise NotAvailable(f"the diagnosis of {evidence.name} does not speak of {arguments[0]}")
-    return float(found[arguments[0]])
+    return float(sum(found))
 

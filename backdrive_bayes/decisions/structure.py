@@ -13,6 +13,8 @@ from backdrive_bayes.mechanics.registry import OPERATOR_PROPERTIES
 
 SMALL = 1e-3
 """A probability that is not worth a word."""
+UNLISTED = "unknown"
+"""The name under which a diagnosis holds what it does not list."""
 NO_VERDICT = "inconclusive diagnosis"
 """What stands for the causes that a diagnosis without a verdict leaves open."""
 
@@ -56,20 +58,24 @@ class Structure:
 def weigh(evidences, probabilities=None) -> Structure:
     """Models of one unit with their probabilities.
 
-    ``probabilities`` are given for several models, at most 1 in all, or (None) read from the diagnosis beside the only one. What
-    they leave over belongs to no model. BadInput where they do not fit.
+    ``probabilities`` are given for several models, at most 1 in all, as shares of what a diagnosis leaves to them; what they
+    leave over belongs to no model. A single model (None) has all of it. BadInput where they do not fit.
     """
     evidences = list(evidences)
     diagnosis = next((e.diagnosis for e in evidences if e.diagnosis), None)
     if probabilities is None and len(evidences) > 1:
         raise BadInput("models", "a probability for each of several models of a unit", "none")
+    given = [1.0] if probabilities is None else [float(p) for p in probabilities]
+    _require_one_unit(evidences, given)
     uncovered = _uncovered(diagnosis, set().union(*(e.effects for e in evidences)))
-    if probabilities is None:
-        return Structure((Model(evidences[0], 1.0 - min(1.0, sum(uncovered.values()))),), uncovered, diagnosis is not None)
-    return _given(evidences, [float(p) for p in probabilities], diagnosis is not None)
+    held = 1.0 - min(1.0, sum(uncovered.values()))
+    if (left := 1.0 - sum(given)) > SMALL:
+        uncovered |= {"models not given": left * held}
+    models = tuple(Model(e, p * held) for e, p in zip(evidences, given, strict=True))
+    return Structure(models, uncovered, diagnosis is not None)
 
 
-def _given(evidences, probabilities, diagnosed):
+def _require_one_unit(evidences, probabilities) -> None:
     good = len(probabilities) == len(evidences) and all(0 <= p <= 1 for p in probabilities) and 0 < sum(probabilities) <= 1 + 1e-6
     if not good:
         shown = ", ".join(f"{p:g}" for p in probabilities)
@@ -79,13 +85,11 @@ def _given(evidences, probabilities, diagnosed):
     for other in evidences[1:]:
         if other.about["data_sha256"] != evidences[0].about["data_sha256"]:
             raise BadInput("models", f"several models of the same records of {evidences[0].name}", "fits of different data")
-    left = max(0.0, 1.0 - sum(probabilities))
-    models = tuple(Model(e, p) for e, p in zip(evidences, probabilities, strict=True))
-    return Structure(models, {"models not given": left} if left > SMALL else {}, diagnosed)
 
 
 def _uncovered(diagnosis, held: set[str]) -> dict[str, float]:
-    """Probabilities of the effects that a diagnosis answers with and neither the models nor the class itself hold."""
+    """Probabilities, by answer of a diagnosis, of all in which something acts that it answers with and neither the models nor the
+    class itself hold."""
     if diagnosis is None:
         return {}
     try:
@@ -100,7 +104,10 @@ def _uncovered(diagnosis, held: set[str]) -> dict[str, float]:
         raise BadInput("diagnosis.json", "probabilities between 0 and 1", str(found | {"unlisted": unlisted})[:80])
     covered = {*held, *OPERATOR_PROPERTIES, *BASELINE, "none"}
     # A fit averages over what may act; what its diagnosis answers with and it does not hold speaks against either decision.
-    out = {name: max(0.5, found.get(name, 0.0)) for name in answer if name not in covered}
-    if unlisted > 0.5:
-        out["unknown"] = max(out.get("unknown", 0.0), unlisted)
+    missing = {name for name in answer if name not in covered} | ({UNLISTED} if unlisted > 0.5 else set())
+    if silent := missing - {UNLISTED}.union(*(label.split("+") for label in found)):
+        raise BadInput("diagnosis.json", "a probability of whatever it answers with", f"none of {', '.join(sorted(silent))}")
+    out = {label: p for label, p in found.items() if missing & set(label.split("+"))}
+    if UNLISTED in missing and (rest := unlisted - sum(p for label, p in out.items() if UNLISTED in label.split("+"))) > SMALL:
+        out[UNLISTED] = out.get(UNLISTED, 0.0) + rest
     return out | ({NO_VERDICT: 0.5} if diagnosis.get("inconclusive") else {})

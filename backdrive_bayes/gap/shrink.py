@@ -52,9 +52,9 @@ class Shrink:
     """What is held out, piece by piece, arrays of shape (pieces,).
 
     ``fold`` numbers the fold of each piece, ``share`` is its part of the fold's torque; ``before``, ``after``,
-    ``control`` and ``floor``
-    are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the control, and noise.
-    ``error`` (1 + resamples, pieces) is what a right model's prediction from the other folds may add to the noise, none first.
+    ``control`` and ``floor`` are its parts of the fold's mean square [rad²]: residuals without and with the effect and of the
+    control, and noise. ``error`` (1 + resamples, pieces) is what a right model's prediction from the other folds may add to the
+    noise, its mean first.
     """
 
     names: tuple[str, ...]
@@ -129,7 +129,7 @@ def shrink(before: Fitted, after: Fitted, weight, rng) -> Shrink:
         sums = np.array([np.bincount(piece, p) for p in parts])
         columns.append(np.concatenate([np.full((1, sums.shape[1]), number), sums]))
         drawn = np.array([np.bincount(piece, share * e**2) for e in error.T])
-        errors.append(np.concatenate([np.zeros((1, sums.shape[1])), drawn]))
+        errors.append(np.concatenate([drawn.mean(axis=0, keepdims=True), drawn]))
     fold, share, without, added, control, floor = np.concatenate(columns, axis=1)
     return Shrink(tuple(folds), fold, share, without, added, control, floor, np.concatenate(errors, axis=1))
 

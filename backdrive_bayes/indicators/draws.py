@@ -38,6 +38,8 @@ UNITS = {
 }
 """Every indicator on which a limit, a comparison or a claim may rest, with its unit."""
 CORE = ("lost_motion_rad", "zero_torque_width_rad", "peak_angle_rad", "loop_area_J", "absorbed_J", "dissipation_ratio")
+LOADED = ("theta_L_rad", "W_L_J")
+"""Of a load that arrives at zero torque, as large as the amplitude but no larger than the rated torque."""
 RESPONSES = ("theta_L_rad", "W_L_J", "loop_area_J", "S_g_J", "S_f_J")
 MOVED = {
     "clearance_rad": ("clearance", "free_play"),
@@ -73,6 +75,11 @@ class IndicatorDraws:
     def rated_torque_nm(self) -> float:
         """T_r [N·m]."""
         return self.posterior.rated_torque_nm
+
+    @property
+    def travelled_nm(self) -> float:
+        """Torque that all records travel, up and down [N·m]."""
+        return float(sum(np.abs(np.diff(b.path_nm)).sum() for b in self.posterior.records.blocks))
 
     @property
     def kept(self) -> np.ndarray:

@@ -110,7 +110,7 @@ def _examined(structure):
         return "not examined: no diagnosis was given, so that an effect that acts beside the model may hide"
     left = structure["unknown_probability"]
     if not left:
-        return "examined by a diagnosis; the models at hand hold what it finds"
+        return "examined by a diagnosis; the models at hand hold what it answers with"
     names = sorted(structure["uncovered"].items(), key=lambda item: -item[1])[:MOST_NAMES]
     told = ", ".join(f"{free(words(n), 60)} {probability_text(p)}" for n, p in names)
     more = ", …" if len(structure["uncovered"]) > MOST_NAMES else ""

@@ -86,8 +86,8 @@ def ranges(saved) -> list:
         _by_record(saved, [f"τ₁ [{unit}]", f"τ₂ [{unit}]", "θ_L [arcmin]", "W_L [mJ]"], cells),
         Note(
             f"{_interval(saved)} τ₁: half the rise from the valley to the hump; τ₂: half the fall after it (this package's "
-            "convention). θ_L, W_L: angle turned and energy absorbed when a load as large as the amplitude arrives at zero "
-            "torque on the rising branch of the settled loop."
+            "convention). θ_L, W_L: angle turned and energy absorbed when a load as large as the amplitude, but no larger than "
+            "T_r, arrives at zero torque on the rising branch of the settled loop."
         ),
         *_loads(saved),
     ]
@@ -111,8 +111,8 @@ def _loads(saved) -> list:
     return [
         Table(columns, rows, [0.8, 0.7, 1.2, 1.2, 0.9]),
         Note(
-            f"{_interval(saved)} Loads that were asked for. Predicted: the load lies beyond the largest measured amplitude, or "
-            "the rate was not measured; the intervals are widened for it."
+            f"{_interval(saved)} Loads that were asked for. Predicted: the load lies beyond the largest amplitude measured at "
+            "that rate, or the rate was not measured; intervals are widened beyond the largest torque and the measured rates."
         ),
     ]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.decided import LOOPS, TYPICAL, diagnosis, evidence
 
-from backdrive_bayes.decisions.acceptance import assess, limited_loops
+from backdrive_bayes.decisions.acceptance import assess, largest_enclosed_j, limited_loops
 from backdrive_bayes.decisions.global_risk import Process
 from backdrive_bayes.decisions.limits import Limit, Limits
 from backdrive_bayes.decisions.loops import measured_loops
@@ -203,6 +203,11 @@ def test_global_risks_come_with_process_knowledge_or_a_batch():
     assert told["batch_units"] == 12 and 1.5 * SD < told["process"]["sd"] < 6 * SD
     with pytest.raises(BadInput, match="at least 3 other units"):
         judge(area(3), batch=batch[:2])
+    with pytest.raises(BadInput, match="the data of b1 once more"):
+        judge(area(3), batch=[*batch, batch[1]])
+    lost = Limit("lost_motion_rad", hi=1.0, rate=0.05, where="w")
+    with pytest.raises(BadInput, match="give the same k·T_r"):
+        judge(lost, batch=[evidence(f"k{i}", seed=i, k=0.1) for i in range(3)])
 
 
 def test_the_naive_decision_stands_beside():
@@ -211,14 +216,66 @@ def test_the_naive_decision_stands_beside():
     assert judge(Limit("peak_angle_rad", hi=1.0, where="w"))["limits"][0]["naive"]["value"] is None
 
 
-def test_an_unknown_cause_moves_an_energy_no_further_than_the_gap_that_it_leaves():
+def test_an_unknown_cause_moves_an_area_no_further_than_the_gap_that_it_leaves():
     """Out of limits by more than the gap can enclose is rejected, whatever the cause; by less, or of a peak, it is open."""
     found, unit = diagnosis(["unknown"], unknown=0.9, none=0.1), evidence()
-    loop, records = unit.largest()[0], len(unit.about["records"])
-    worth = 10 * SD / (4 * loop.amplitude * np.sqrt(records))
+    worth = 10 * SD / largest_enclosed_j(1.0, unit.largest()[0].amplitude, unit.draws.travelled_nm)
     small, large = (evidence(diagnosis=found | {"gap": {"rms_rad": worth * f}}) for f in (1.0, 4.0))
     assert judge(area(-30), e=small)["verdict"] == "rejected" and judge(area(-30), e=large)["verdict"] == "inconclusive"
     assert judge(area(30), e=small)["verdict"] == "inconclusive", "a gap of unknown cause accepts nothing"
     peak = Limit("peak_angle_rad", hi=0.5 * TYPICAL["peak_angle_rad"], rate=0.05, where="w")
     assert judge(peak, e=small)["verdict"] == "inconclusive"
+    absorbed = Limit("absorbed_J", hi=0.5 * TYPICAL["absorbed_J"], rate=0.05, where="w")
+    assert judge(absorbed, e=small)["verdict"] == "inconclusive", "it holds the tip's angle, which no mean bounds"
     assert judge(peak, area(-30), e=small)["verdict"] == "rejected", "one limit that is surely broken is enough"
+
+
+@pytest.mark.parametrize("onset", [-1.0, 0.6, 0.9])
+@pytest.mark.parametrize("amplitudes", [(1.0,), (1.0, 0.2), (1.0, 0.4, 0.4)])
+def test_no_gap_encloses_more_than_its_root_mean_square_allows(amplitudes, onset):
+    """A gap that is there in one record alone, up and down beyond a torque. The planted fault weighs records alike."""
+    for own in amplitudes:
+        torque = {t: t * np.interp(np.linspace(0, 5, 5001), range(6), [0, 1, 0, -1, 0, 1]) for t in amplitudes}
+        step = {t: np.diff(q) for t, q in torque.items()}
+        gap = {t: np.where((t == own) & (torque[t][1:] > onset * t), np.sign(step[t]), 0.0) for t in amplitudes}
+        travelled = sum(np.abs(s).sum() for s in step.values())
+        rms = np.sqrt(sum(np.abs(step[t]) @ gap[t] ** 2 for t in amplitudes) / travelled)
+        cycle = slice(1000, 5000)
+        area = abs(step[own][cycle] @ gap[own][cycle])
+        assert 0.0 < area <= largest_enclosed_j(rms, own, travelled) * (1 + 1e-9)
+        if own == 0.2 and onset < 0.0:
+            assert area > 4.0 * own * rms * np.sqrt(len(amplitudes))
+
+
+@pytest.mark.parametrize(("sds", "some"), [(4.0, True), (1.8, False)])
+def test_between_two_limits_a_median_is_accepted_where_both_are_kept(sds, some):
+    """The planted fault guards against either limit alone: it would accept a unit that is within both with 0.93."""
+    both = Limit("loop_area_J", lo=AREA - sds * SD, hi=AREA + sds * SD, rate=0.05, where="w")
+    row = judge(both)["limits"][0]
+    assert bool(row["accept_median_between"]) == some == (row["verdict"] == "accepted")
+    if some:
+        lo, hi = row["accept_median_between"]
+        assert both.lo < lo < AREA < hi < both.hi
+    else:
+        assert both.lo + row["guard_band"]["above_min"] < row["median"] < both.hi - row["guard_band"]["below_max"]
+
+
+def test_given_models_share_what_the_diagnosis_leaves_them():
+    """The planted fault was to forget the diagnosis where models are given: what was open was accepted."""
+    unexplained = evidence(diagnosis=diagnosis(["unknown"], unknown=0.97, none=0.03))
+    assert assess([unexplained, evidence()], Limits((area(3),)), [0.3, 0.7])["verdict"] == "inconclusive"
+    half = assess([unexplained, evidence()], Limits((area(3),)), [0.3, 0.2])["structure"]
+    assert half["uncovered"] == pytest.approx({"unknown": 0.97, "models not given": 0.015})
+    assert [m["probability"] for m in half["models"]] == pytest.approx([0.009, 0.006])
+
+
+def test_what_is_in_no_model_is_counted_once_an_answer():
+    """Two effects that act together with 0.6 are not held with 0.6: not with the sum of a half each."""
+    both = "sensor_lag+viscoelastic_creep"
+    pair = evidence(diagnosis=diagnosis(both.split("+"), **{both: 0.6, "none": 0.4}))
+    assert judge(area(3), e=pair)["structure"]["uncovered"] == {both: 0.6}
+    single = evidence(diagnosis=diagnosis(["sensor_lag"], **{"sensor_lag": 0.35, both: 0.2, "none": 0.3}))
+    told = judge(area(3), e=single)
+    assert told["verdict"] == "inconclusive" and told["structure"]["unknown_probability"] == pytest.approx(0.55)
+    with pytest.raises(BadInput, match="none of slip"):
+        judge(area(3), e=evidence(diagnosis=diagnosis(["slip"], none=1.0)))

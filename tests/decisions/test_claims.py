@@ -1,10 +1,12 @@
 """Claims: a language that can ask and nothing else, and answers that follow the draws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.decided import diagnosis, evidence
+from support.decided import LOOPS, diagnosis, evidence
 
 from backdrive_bayes.decisions import series
 from backdrive_bayes.decisions.claims import answer, read_claims
@@ -110,6 +112,43 @@ def test_what_can_be_asked(tmp_path, entry, verdict):
     found = ask(tmp_path, entry)
     assert verdict is None or found["verdict"] == verdict, found["reason"]
     assert (found["probability"] is None) == bool(found["reason"])
+
+
+def test_an_effect_acts_alone_or_beside_others(tmp_path):
+    """The planted fault reads the exact label: of an effect that acts with 0.35 it says that it does not hold."""
+    which = {"interface_slip": 0.02, "interface_slip+sensor_lag": 0.33, "none": 0.65}
+    unit, asked = evidence("a", diagnosis=diagnosis(["none"], **which)), "probability = \"A.effect('interface_slip')\""
+    assert ask(tmp_path, asked, unit)["probability"] == pytest.approx(0.35) != which["interface_slip"]
+    of_simulator = evidence("a", diagnosis=diagnosis(["none"], **which) | {"simulator": {"unit": "s"}})
+    assert "what a simulator lacks" in ask(tmp_path, asked, of_simulator)["reason"]
+    twice = ask(tmp_path, "probability = \"A.effect('none') + A.effect('interface_slip') + 1\"", unit)
+    assert twice["verdict"] == "not answered" and "between 0 and 1" in twice["reason"]
+
+
+@pytest.mark.parametrize(
+    "entry",
+    ['holds = "mean(A.loop_area_J) > mean(B.loop_area_J)"\nalong = "amplitude"',
+     'holds = "largest(A.width_rad) > largest(B.width_rad)"\nalong = "torque"'],
+)  # fmt: skip
+def test_a_series_goes_no_further_than_each_unit_was_measured(tmp_path, entry):
+    """The planted fault repeats the last value of the unit that was measured less far."""
+    less = evidence("b", seed=1, loops=tuple((rate, 0.4 * amplitude) for rate, amplitude in LOOPS))
+    found = ask(tmp_path, entry, evidence("a"), less)
+    assert found["verdict"] == "not answered" and "beyond the measured 0.04" in found["reason"]
+    assert ask(tmp_path, entry, evidence("a"), evidence("b", seed=1))["verdict"] != "not answered"
+
+
+def test_loads_of_different_size_are_not_compared(tmp_path):
+    less = evidence("b", seed=1)
+    less = replace(less, draws=replace(less.draws, rated_torque_nm=0.08))
+    found = ask(tmp_path, 'holds = "A.W_L_J > B.W_L_J"', evidence("a"), less)
+    assert found["verdict"] == "not answered" and "loads are 0.1 N·m and 0.08 N·m" in found["reason"]
+    assert ask(tmp_path, 'holds = "A.W_L_J > B.W_L_J"\namplitude = 0.05', evidence("a"), less)["verdict"] != "not answered"
+
+
+def test_a_place_has_the_unit_of_its_coordinate(tmp_path):
+    asked = ask(tmp_path, 'holds = "at_highest(A.loop_area_J) > 0"\nalong = "rate"')["numbers"]
+    assert [n["unit"] for n in asked] == ["N·m/s"]
 
 
 REFUSED = [

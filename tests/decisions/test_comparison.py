@@ -1,5 +1,7 @@
 """Comparison: differences with their probabilities, matched where allowed, refused with a reason where not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -84,6 +86,21 @@ def test_lost_motion_at_other_torques_is_not_compared():
     for condition in pair["conditions"]:
         assert "give the same k" in condition["not_compared"]["lost_motion_rad"]
         assert "lost_motion_rad" not in condition["indicators"] and "loop_area_J" in condition["indicators"]
+
+
+def test_loops_of_about_one_amplitude_are_compared_at_one():
+    """Two per cent of amplitude are four of S; the planted fault takes each unit's own."""
+    less = evidence("b", loops=tuple((rate, 0.982 * amplitude) for rate, amplitude in LOOPS))
+    pairs, _ = match(evidence("a"), less)
+    assert [(m.first.amplitude, m.second.amplitude) for m in pairs] == 3 * [(0.1, 0.1)]
+    assert not any(m.second.predicted for m in pairs), "so near, a loop counts as measured"
+
+
+def test_energies_at_different_loads_are_not_compared():
+    less = evidence("b", seed=1)
+    less = replace(less, draws=replace(less.draws, rated_torque_nm=0.08), about=less.about | {"k": 0.03 / 0.8})
+    condition = compare([evidence("a"), less])["pairs"][0]["conditions"][0]
+    assert set(condition["not_compared"]) == {"theta_L_rad", "W_L_J"} and "lost_motion_rad" in condition["indicators"]
 
 
 def test_nothing_in_common_is_one_clear_line():

@@ -45,6 +45,11 @@ class Invented:
     rated_torque_nm: float = 0.1
 
     @property
+    def travelled_nm(self):
+        """A cycle and a quarter each."""
+        return 5.0 * float(self.amplitudes.sum())
+
+    @property
     def kept(self):
         return np.linspace(0, CHAINS * DRAWS - 1, KEPT).astype(int)
 
@@ -124,7 +129,7 @@ def diagnosis(answer=(), **which):
 
 
 def _about(name, loops, converged, k, effects):
-    about = indicators(len(loops)) | {"unit": name, "k": k}
+    about = indicators(len(loops)) | {"unit": name, "k": k, "data_sha256": [f"data of {name}"]}
     about["model"] = {"modules": ["geometric", "elastic", "friction"], "effects": list(effects)}
     advice = "" if converged else "not converged within the budget of evaluations: check the records"
     about["convergence"] |= {"converged": converged, "advice": advice}
