@@ -73,7 +73,8 @@ def _refuse_swapped(record: Record, rated_torque_nm: float | None, where: str) -
         found = "straight ramps of angle and curves of torque" + (
             f" ({largest:.4g} N·m where {expected:.4g} N·m is declared)" if expected is not None else ""
         )
-        raise BadInput(f"{where}, columns torque and angle", "straight ramps of torque", f"{found}: channels swapped?")
+        way = "channels swapped? Where the angle is what is driven, give amplitude_Nm of this record in unit.toml"
+        raise BadInput(f"{where}, columns torque and angle", "straight ramps of torque", f"{found}: {way}")
 
 
 def _misfit(time: np.ndarray, values: np.ndarray) -> float:
