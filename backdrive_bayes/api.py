@@ -112,8 +112,9 @@ class Diagnosis:
     def _repr_html_(self):
         rows = [[name, probability_text(p)] for name, p in self.probabilities.items() if p >= 0.005]
         where = html.escape(self.result["where"]["summary"])
-        named = f"{line(self.result['outcome'])}: {' + '.join(self.effects) or 'no gap'}"
-        return _title(self.result["unit"], named) + _table(["effect", "probability"], rows) + f"<p>{where}</p>"
+        outcome = self.result["outcome"]
+        named = "" if outcome["exit_code"] else f": {' + '.join(self.effects) or 'no gap'}"
+        return _title(self.result["unit"], line(outcome) + named) + _table(["effect", "probability"], rows) + f"<p>{where}</p>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +163,8 @@ class Comparison:
         return _save(self.result, "comparison.json", folder, figures)
 
     def _repr_html_(self):
-        out = _title("Comparison of " + ", ".join(self.result["names"]), f"ratios with {self.result['level']:.0%} intervals")
+        told = f"{line(self.result['outcome'])}: ratios with {self.result['level']:.0%} intervals"
+        out = _title("Comparison of " + ", ".join(self.result["names"]), told)
         for pair in self.result["pairs"]:
             rows = [
                 [f"{c['loading_rate_Nm_per_s']:.3g}", f"{c['amplitude_Nm']:.3g}", name, _interval(r["ratio"]),
@@ -213,8 +215,9 @@ def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
     models = list(fitted) if isinstance(fitted, list | tuple) else [fitted]
     name = "" if isinstance(limits, Limits) else Path(limits).name
     limits = limits if isinstance(limits, Limits) else read_limits(limits)
-    evidences = [_evidence(m, examined=True) for m in models]
-    others = Pool.read(Path(batch)) if isinstance(batch, str | Path) else [_evidence(b) for b in batch]
+    k = limits.only_k(name)
+    evidences = [_evidence(m, k, examined=True) for m in models]
+    others = Pool.read(Path(batch)) if isinstance(batch, str | Path) else [_evidence(b, k) for b in batch]
     result = assess(evidences, limits, probabilities, others) | collected([evidences[0].about])
     units = others.about["units"] if isinstance(others, Pool) else [other.name for other in others]
     return Verdict(stamped_by(result, evidences[:1], limits=name, models=len(models), batch=units))
@@ -257,8 +260,9 @@ def _fitted(ready, posterior, indicators) -> Fit:
     return Fit(posterior, indicators)
 
 
-def _evidence(fitted, examined: bool = False) -> Evidence:
-    """Draws to decide on; ``examined`` asks for the diagnosis of a unit that is fitted for them."""
+def _evidence(fitted, k: float | None = None, examined: bool = False) -> Evidence:
+    """Draws to decide on; a unit is fitted for them with the lost motion at ``k`` T_r, and diagnosed where it is to be
+    ``examined``."""
     if isinstance(fitted, Fit):
         return fitted.evidence
     if isinstance(fitted, Diagnosis):
@@ -267,8 +271,9 @@ def _evidence(fitted, examined: bool = False) -> Evidence:
         return fitted
     if not isinstance(fitted, record.Unit) and is_result(Path(fitted)):
         return Evidence.read(Path(fitted))
-    found = fit(fitted).evidence
-    return replace(found, diagnosis=diagnose(fitted).result) if examined else found
+    options = {} if k is None else {"k": k}
+    found = fit(fitted, **options).evidence
+    return replace(found, diagnosis=diagnose(fitted, **options).result) if examined else found
 
 
 def _save(result, name, folder, figures):

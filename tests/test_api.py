@@ -74,11 +74,11 @@ def test_unknown_names_are_attribute_errors():
 
 @pytest.fixture(scope="module")
 def units(tmp_path_factory):
-    """Two small units of one short record each."""
+    """Four small units of one short record each."""
     from conftest import answer
 
     folders = []
-    for name, compliance in (("a", 0.01), ("b", 0.02)):
+    for name, compliance in (("a", 0.01), ("b", 0.02), ("c", 0.021), ("d", 0.022)):
         folder = tmp_path_factory.mktemp(name)
         time, torque = ramps(noise=0.01)
         rng = np.random.default_rng(len(name))
@@ -138,14 +138,14 @@ def test_example_five_lines(run_here, units, tmp_path, few_draws):
 
 
 def test_example_compare_units(run_here, units, tmp_path):
-    said = run_here("compare_units.py", *units, "--out", tmp_path / "out")
+    said = run_here("compare_units.py", *units[:2], "--out", tmp_path / "out")
     assert "A turns less than B at every rate" in said and (tmp_path / "out" / "report.pdf").exists()
 
 
 def test_example_acceptance_by_batch(run_here, units, tmp_path):
     limits = tmp_path / "limits.toml"
     limits.write_text("[peak_angle_rad]\nmax = 1")
-    said = run_here("acceptance_by_batch.py", units[0], *[units[1]] * 3, "--limits", limits)
+    said = run_here("acceptance_by_batch.py", *units, "--limits", limits)
     assert "global risks: {" in said
 
 

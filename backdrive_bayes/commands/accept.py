@@ -99,10 +99,7 @@ def _fit(args, limits, options, note):
     facts = record_facts(reduce_unit(unit))
     for limit in limits.limits:
         limited_loops(limit, measured_loops(facts.rate_nm_per_s, facts.amplitude_nm))
-    wanted = {limit.k for limit in limits.limits if limit.k is not None}
-    if len(wanted) > 1:
-        raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))
-    options = replace(options, k=wanted.pop()) if wanted else options
+    options = replace(options, k=limits.only_k(args.limits) or options.k)
     posterior, result = fit_unit(unit, options, note)
     # What acts beside the model would shift every number that is judged.
     diagnosis, _ = diagnose_unit(unit, options, note, sample=False)

@@ -76,10 +76,7 @@ def _job(args, out: Path):
     from backdrive_bayes.fleet.task import Job
 
     options, limits = FitOptions.of(args), read_limits(args.limits) if args.limits else None
-    wanted = {limit.k for limit in limits.limits if limit.k is not None} if limits else set()
-    if len(wanted) > 1:
-        raise BadInput(args.limits, "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in sorted(wanted)))
-    options = replace(options, k=wanted.pop()) if wanted else options
+    options = replace(options, k=(limits.only_k(args.limits) if limits else None) or options.k)
     told = options.to_json() | {"diagnose": args.diagnose or limits is not None, "force": args.force}
     told["limits"] = [_plain(limit) for limit in limits.limits] if limits else None
     told["risks"] = [limits.consumer, limits.producer] if limits else None

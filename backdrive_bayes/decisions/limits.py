@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from backdrive_bayes.decisions.global_risk import Process
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.schemas.limits_file import CONSUMER, PRODUCER, LimitsFile, LimitTable
 from backdrive_bayes.schemas.toml_file import read_typed
 
@@ -34,6 +35,13 @@ class Limits:
     limits: tuple[Limit, ...]
     consumer: float = CONSUMER
     producer: float = PRODUCER
+
+    def only_k(self, where: object) -> float | None:
+        """The share of T_r at which all limited lost motions are meant, None where none says; BadInput where they differ."""
+        wanted = sorted({limit.k for limit in self.limits if limit.k is not None})
+        if len(wanted) > 1:
+            raise BadInput(where or "limits", "one k for all limits on the lost motion", ", ".join(f"{k:g}" for k in wanted))
+        return wanted[0] if wanted else None
 
 
 def read_limits(path: Path | str) -> Limits:

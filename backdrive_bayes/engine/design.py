@@ -178,8 +178,11 @@ def tangent_groups(reduced, reducer, design: Design, distortion, known, effects:
         if isinstance(effect, GrowthEffect):
             growths.append(effect)
         elif isinstance(effect, TangentEffect):
-            moved = replace(distortion, **{effect.parameter: getattr(distortion, effect.parameter) + STEP})
-            by = [(a - b) / STEP for a, b in zip(class_prediction(reduced, reducer, moved, weights), base, strict=True)]
+            here = getattr(distortion, effect.parameter)
+            # To either side: of a unit upside down, more of it is less.
+            ends = (replace(distortion, **{effect.parameter: here + step}) for step in (0.5 * STEP, -0.5 * STEP))
+            more, less = (class_prediction(reduced, reducer, end, weights) for end in ends)
+            by = [(a - b) / STEP for a, b in zip(more, less, strict=True)]
             late = by if effect.parameter == "lag_s" else late
             groups.append(_columns(effect.name, by))
     for part in range(len(GROWING)):
@@ -221,10 +224,10 @@ def _smoothing(reduced, reducer, distortion, weights, base, delayed):
     prompt = grown_histories(reduced, replace(distortion, lag_s=0.0))
     for (history, grown), pure, by in zip(prompt, base, delayed, strict=True):
         mean, end = reducer.along(history, weights, grown)
-        late, later = (
+        late, less, more = (
             np.bincount(history.block, history.weight * behind(mean, end, history.t0, history.t1, lag), history.blocks)
-            for lag in (distortion.lag_s, distortion.lag_s + STEP)
+            for lag in distortion.lag_s + STEP * np.array([0.0, -0.5, 0.5])
         )
         found.append(late - pure)
-        growth.append((later - late) / STEP - by)
+        growth.append((more - less) / STEP - by)
     return found, growth

@@ -30,10 +30,16 @@ def learn_wander(linear: Linear) -> tuple[Reduced, float]:
     noise, gained = list(linear.reduced.noise), 0.0
     rows = np.column_stack([linear.data.x, linear.data.y])
     inner = [part.T @ part for part in np.split(rows, np.cumsum([a.size for a in linear.angles])[:-1])]
-    for r in range(len(noise)):
-        found, gain, own = _learn(linear, r, sum(inner) - inner[r])
-        if gain > 0.0:
-            noise[r], inner[r], gained = found, own, gained + gain
+    left = set(range(len(noise)))
+    while left:
+        # The record that gains most comes first, whatever their order.
+        found = {r: _learn(linear, r, sum(inner) - inner[r]) for r in left}
+        best = max(found, key=lambda r: found[r][1])
+        own, gain, rows_of_it = found[best]
+        if not gain > 0.0:
+            break
+        noise[best], inner[best], gained = own, rows_of_it, gained + gain
+        left.remove(best)
     return replace(linear.reduced, noise=tuple(noise)), gained
 
 

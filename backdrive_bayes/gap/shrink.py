@@ -123,7 +123,8 @@ def shrink(before: Fitted, after: Fitted, weight, rng) -> Shrink:
         (without, _), (with_effect, wide) = (_held_out(f, own, record) for f in (before, after))
         residuals = [r * scale for r in (without, with_effect, without - _control(before, own, record))]
         error = (wide - share @ wide) @ rng.standard_normal((wide.shape[1], RESAMPLED)) * scale
-        place = np.floor(2 * torque[own] / np.abs(torque[own]).max()).astype(int)
+        half = np.minimum((2 * np.abs(torque[own]) / np.abs(torque[own]).max()).astype(int), 1)
+        place = np.where(torque[own] < 0, -1 - half, half)
         piece = np.unique(np.stack([leg[own], place]), axis=1, return_inverse=True)[1].ravel()
         parts = (share, *(share * (r - r @ share) ** 2 for r in residuals), share * variance[own])
         sums = np.array([np.bincount(piece, p) for p in parts])

@@ -1,6 +1,7 @@
 """Slow wander of the reading is found where it is, at about its size and time, and not where it is not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.mechanics.effect import Distortion
 from backdrive_bayes.mechanics.reducer import BASELINE
 from backdrive_bayes.mechanics.registry import library_terms
+from backdrive_bayes.records.unit_folder import read_unit
 
 SIZE, TIME = 1e-4, 0.1
 """Of the planted wander: its standard deviation [rad], and its correlation time in shares of a leg."""
@@ -47,6 +49,16 @@ def test_a_planted_wander_is_learnt_at_its_size_and_time():
 def test_a_reading_that_does_not_wander_has_none():
     reduced, gain = learnt(0.0)
     assert gain == 0.0 and all(n.wander_rad == 0.0 for n in reduced.noise)
+
+
+def test_the_order_of_the_records_decides_nothing():
+    """The planted fault learns them in turn: the first of those that a wander of one could explain has it."""
+    unit, found = read_unit(Path(__file__).parents[2] / "data" / "reducer-2"), []
+    for order in ((0, 1, 2, 3), (3, 1, 2, 0)):
+        reduced = reduce_unit(replace(unit, records=tuple(unit.records[k] for k in order)))
+        learnt, gain = learn_wander(Search(reduced, library_terms(), BASELINE).first(Distortion()))
+        found.append({b.name: n.wander_rad for b, n in zip(learnt.blocks, learnt.noise, strict=True)} | {"gain": gain})
+    assert found[0] == pytest.approx(found[1], rel=1e-5) and found[0]["gain"] > 10
 
 
 def test_a_wander_is_no_drift(monkeypatch):

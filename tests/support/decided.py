@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass
+from hashlib import sha256
 
 import numpy as np
 from support_results import indicators
@@ -129,7 +130,7 @@ def diagnosis(answer=(), **which):
 
 
 def _about(name, loops, converged, k, effects):
-    about = indicators(len(loops)) | {"unit": name, "k": k, "data_sha256": [f"data of {name}"]}
+    about = indicators(len(loops)) | {"unit": name, "k": k, "data_sha256": [sha256(name.encode()).hexdigest()]}
     about["model"] = {"modules": ["geometric", "elastic", "friction"], "effects": list(effects)}
     advice = "" if converged else "not converged within the budget of evaluations: check the records"
     about["convergence"] |= {"converged": converged, "advice": advice}
