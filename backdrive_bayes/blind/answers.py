@@ -45,7 +45,8 @@ def read_answer(path: Path) -> Answer:
 def understand(diagnosis: dict) -> Answer:
     """The object of diagnosis.json as an :class:`Answer`."""
     try:
-        reason = diagnosis.get("inconclusive")
+        convergence = diagnosis.get("convergence") or {}
+        reason = diagnosis.get("inconclusive") or (convergence.get("converged") is False and "its sampling has not converged")
         if reason:
             return Answer(None, f"inconclusive: {reason}")
         probabilities = _probabilities(diagnosis["which"])

@@ -93,7 +93,7 @@ def _diagnosed(diagnosis):
         return {"answer": None, "credible_set_90": None, "gap_probability": None, "unlisted_probability": None}
     answer, gap = diagnosis["answer"], diagnosis["gap"]
     return {
-        "answer": "inconclusive" if diagnosis["inconclusive"] else "+".join(answer["effects"]) or "none",
+        "answer": "inconclusive" if diagnosis["outcome"]["exit_code"] else "+".join(answer["effects"]) or "none",
         "credible_set_90": ",".join(answer["credible_set_90"]),
         "gap_probability": gap["probability"],
         "unlisted_probability": gap["unlisted_probability"],

@@ -10,12 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.fleet.units import FleetUnit
+from backdrive_bayes.fleet.units import LOCK, FleetUnit
 
 SCHEMA = "backdrive-bayes/fleet-unit/1"
 DONE, FAILED, SET_ASIDE = "done", "failed", "set_aside"
 UNITS, POSTERIORS = "units", "posteriors"
-LOCK = ".fleet.lock"
 
 
 class CannotKeep(Exception):

@@ -73,8 +73,11 @@ def carry_out(job: Job, unit: FleetUnit) -> Done:
             rows, error = job.work(unit.path, folder), None
     except CannotKeep:
         raise
-    except Exception as raised:
+    except BadInput as raised:
         rows, error = [], _line(raised)
+    except Exception as raised:
+        # No fault of the unit's files, such as a reader that is not installed: it is tried once more.
+        rows, error, stamp = [], _line(raised), stamp | {"files_sha256": None}
     status = FAILED if error else DONE
     write_result(job.out, unit, stamp, status, error, rows)
     return Done(status, error, time.perf_counter() - began)

@@ -12,6 +12,8 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.readers import record_suffix
 
 UNIT_FILE = "unit.toml"
+LOCK = ".fleet.lock"
+"""Lies in a folder to which a fleet's table is written."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,8 @@ class FleetUnit:
 def find_units(folder: Path, out: Path) -> list[FleetUnit]:
     """Every unit folder below ``folder`` (or itself) and every record file outside of unit folders, in order of their names.
 
-    Links to unit folders count, links to other folders are not followed. ``out`` and hidden folders are left
-    out. Raises BadInput where there is none, or ``out`` lies inside a unit.
+    Links to unit folders count, links to other folders are not followed. ``out``, hidden folders and the tables of fleets are
+    left out. Raises BadInput where there is none, or ``out`` lies inside a unit.
     """
     folder, out = Path(folder).resolve(), Path(out).resolve()
     if not folder.is_dir():
@@ -63,7 +65,8 @@ def find_units(folder: Path, out: Path) -> list[FleetUnit]:
             continue
         found += [here / name for name in below if (here / name).is_symlink() and (here / name / UNIT_FILE).is_file()]
         below[:] = sorted(name for name in below if not name.startswith(".") and here / name != out)
-        found += [here / name for name in sorted(files) if not name.startswith(".") and record_suffix(here / name)]
+        if LOCK not in files:
+            found += [here / name for name in sorted(files) if not name.startswith(".") and record_suffix(here / name)]
     if not found:
         raise BadInput(folder, "a folder with units (unit.toml and record files) below it", "none")
     return sorted((FleetUnit(_name(path, folder), path) for path in found), key=lambda unit: unit.name)

@@ -12,12 +12,12 @@ import time
 import pytest
 from support.fleet_units import Dies, Read, make_fleet, make_unit
 
-from backdrive_bayes.errors import BadInput
+from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.fleet import cluster
 from backdrive_bayes.fleet.run import run_fleet
 from backdrive_bayes.fleet.store import locked, read_stored, result_path
 from backdrive_bayes.fleet.table import NAME, compact
-from backdrive_bayes.fleet.task import Job
+from backdrive_bayes.fleet.task import Job, carry_out
 from backdrive_bayes.fleet.units import find_units
 
 UNITS = 6
@@ -154,6 +154,21 @@ def test_a_bad_unit_is_a_row_with_its_error_and_units_of_one_name_are_two(two_wo
     assert found["u-4"]["rows"][0]["name"] == found["again/u-4"]["rows"][0]["name"]
     assert found["u-4"]["rows"][0]["lost_motion_rad"] != found["again/u-4"]["rows"][0]["lost_motion_rad"]
     assert counts(run(two_workers, fleet, out)[1]) == {"kept": UNITS + 2}, "what failed fails again, unless it changes"
+
+
+@pytest.mark.parametrize(
+    ("error", "again"), [(MissingExtra("reading", "p", "e"), True), (BadInput("a", "b", "c"), False)], ids=["reader", "file"]
+)
+def test_what_is_no_fault_of_the_unit_is_tried_again(fleet, tmp_path, error, again):
+    """A reader that is not installed may be installed before the same command goes on; a file that cannot be read may not."""
+
+    def work(path, folder):
+        raise error
+
+    unit, job = find_units(fleet, tmp_path)[0], Job(tmp_path, work)
+    with locked(tmp_path):
+        assert carry_out(job, unit).status == "failed"
+        assert job.has(unit, job.stamp(unit)) != again
 
 
 def test_a_unit_whose_worker_dies_once_is_worked_on_again(two_workers, fleet, tmp_path, undisturbed):

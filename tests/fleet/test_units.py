@@ -6,7 +6,7 @@ import pytest
 from support.fleet_units import make_unit
 
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.fleet.units import FleetUnit, find_units
+from backdrive_bayes.fleet.units import LOCK, FleetUnit, find_units
 
 
 def names(folder, out=None):
@@ -19,6 +19,16 @@ def test_unit_folders_and_lone_records_are_found_in_order(tmp_path):
     (tmp_path / "lone.csv").write_text("x")
     (tmp_path / "notes.txt").write_text("x")
     assert names(tmp_path) == ["a/deep/er/u", "a/u", "b/u", "lone.csv"]
+
+
+def test_the_table_of_a_fleet_is_no_unit(tmp_path):
+    """The same command, twice in the fleet's own folder, and once beside an output of before."""
+    make_unit(tmp_path / "u")
+    for place in (tmp_path, tmp_path / "before"):
+        place.mkdir(exist_ok=True)
+        (place / LOCK).write_text("")
+        (place / "fleet.parquet").write_bytes(b"PAR1")
+        assert names(tmp_path, tmp_path) == names(tmp_path, tmp_path / "judged") == ["u"]
 
 
 def test_links_to_units_count_and_links_to_folders_are_not_followed(tmp_path):
