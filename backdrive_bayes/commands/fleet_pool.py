@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shutil
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
@@ -31,8 +32,9 @@ def read_draws(folder: Path, name: str, seed: int):
 def pool_fleet(job: Job, units: list[FleetUnit], found: list, client, level: float, figures: bool, note: Callable) -> list[Path]:
     """Pool the batches of a fleet's ``units``, whose table rows ``found`` holds, and return the folders written.
 
-    A batch with too few units that can be pooled is said and left out.
+    Pools of before are gone. A batch with too few units that can be pooled is said and left out.
     """
+    shutil.rmtree(job.out / POOLS, ignore_errors=True)
     batches = defaultdict(list)
     for unit, (_, _, rows) in zip(units, found, strict=True):
         if rows[0]["status"] == DONE:

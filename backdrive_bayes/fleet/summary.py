@@ -14,6 +14,7 @@ from backdrive_bayes.fleet.drift import FALSE_ALARM, FEWEST, find_drift
 from backdrive_bayes.fleet.store import DONE, UNITS
 from backdrive_bayes.fleet.table import rows_of
 from backdrive_bayes.fleet.units import FleetUnit
+from backdrive_bayes.indicators.same_loop import most_alike, same_amplitude
 from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.results import FLEET
 
@@ -95,8 +96,9 @@ def _charted(done):
     usable = [(unit, rows) for unit, rows in done if rows[0]["converged"] and not rows[0]["forced"]]
     if not usable:
         return [], None
-    rated = Counter(rows[0]["rated_torque_Nm"] for _, rows in usable).most_common(1)[0][0]
-    rows = [r for _, own in usable for r in own if own[0]["rated_torque_Nm"] == rated]
+    # That of a bare record file is the largest torque that was read.
+    rated = most_alike([rows[0]["rated_torque_Nm"] for _, rows in usable])
+    rows = [r for _, own in usable for r in own if same_amplitude(own[0]["rated_torque_Nm"], rated)]
     loops = measured_loops([r["loading_rate_Nm_per_s"] for r in rows], [r["amplitude_Nm"] for r in rows])
     shared = max(loops, key=lambda x: (len({rows[i]["unit"] for i in x.records}), x.amplitude, -x.rate))
     chosen = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -66,6 +67,8 @@ def carry_out(job: Job, unit: FleetUnit) -> Done:
     stamp = job.stamp(unit)
     if job.has(unit, stamp):
         return Done(KEPT, None, time.perf_counter() - began)
+    # One that is there rests on something else.
+    shutil.rmtree(posterior_folder(job.out, unit), ignore_errors=True)
     folder = posterior_folder(job.out, unit) if job.posteriors else None
     try:
         # What verbs say of a unit stands in its rows; sums in another order would change last bits.

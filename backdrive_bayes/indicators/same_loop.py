@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 SAME_RATE = 0.1
 """Relative difference up to which two loading rates are the same: drives hold a ramp to a few per cent."""
 SAME_AMPLITUDE = 0.02
@@ -16,3 +18,11 @@ def same_rate(a: float, b: float) -> bool:
 def same_amplitude(a: float, b: float) -> bool:
     """Whether two amplitudes are the same."""
     return abs(a / b - 1) <= SAME_AMPLITUDE
+
+
+def most_alike(torques) -> float:
+    """The one of several torques that most others are the same as; of several such the first."""
+    values = np.asarray(torques, float)
+    rising = np.sort(values)
+    ends = (np.searchsorted(rising, values * (1 + sign * SAME_AMPLITUDE), side) for sign, side in ((1, "right"), (-1, "left")))
+    return float(values[np.argmax(np.subtract(*ends))])

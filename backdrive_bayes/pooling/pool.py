@@ -11,6 +11,7 @@ from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import CORE
 from backdrive_bayes.indicators.intervals import LEVEL
+from backdrive_bayes.indicators.same_loop import most_alike, same_amplitude
 from backdrive_bayes.pooling.hierarchy import FEWEST_UNITS
 from backdrive_bayes.pooling.loss import MOST_BITS
 from backdrive_bayes.pooling.quantity import pool_quantity
@@ -45,11 +46,11 @@ def pool_batch(batch: str, units: list[UnitDraws], seed: int = 0, level: float =
 def _comparable(units):
     """Units that may be pooled, and the others with the reason."""
     used = [u for u in units if u.usable]
-    kinds = Counter((u.rated_torque_nm, u.k) for u in used)
-    most = kinds.most_common(1)[0][0] if kinds else None
+    k = Counter(u.k for u in used).most_common(1)[0][0] if used else None
+    rated = most_alike([u.rated_torque_nm for u in used if u.k == k]) if used else None
     kept, left = [], []
     for unit in units:
-        if unit.usable and (unit.rated_torque_nm, unit.k) == most:
+        if unit.usable and unit.k == k and same_amplitude(unit.rated_torque_nm, rated):
             kept.append(unit)
         else:
             left.append({"unit": unit.name, "why": "another rated torque or k" if unit.usable else "not converged, or forced"})

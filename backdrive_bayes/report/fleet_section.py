@@ -58,7 +58,8 @@ def _facts(result):
         if result[key]:
             rows.append((name, ", ".join(f"{words(n).replace('+', ' + ')} {count}" for n, count in result[key].items())))
     if loop:
-        left_out = f"; {loop['left_out']} left out (not converged, forced, or without this loop)" if loop["left_out"] else ""
+        why = "not converged, forced, of another T_r, or without this loop"
+        left_out = f"; {loop['left_out']} left out ({why})" if loop["left_out"] else ""
         rows.append((
             "Charts",
             f"{loop['units']} units in order of {order_words(result)}, at {loop['loading_rate_Nm_per_s']:.3g} N·m/s, "

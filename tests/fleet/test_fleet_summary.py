@@ -77,6 +77,15 @@ def test_a_unit_in_a_folder_is_of_that_batch(steady):
     assert {r["batch"] for r in summarise(found)["batches"]["rows"]} == {"b0", "b1"}
 
 
+def test_rated_torques_as_read_from_bare_records_are_one(steady):
+    """Of a bare record the largest torque read stands for T_r, noise and all; the planted fault wants them equal."""
+    found, rng = units(steady), np.random.default_rng(0)
+    for _, _, rows in found:
+        for one in rows:
+            one["rated_torque_Nm"] = 0.1 * (1 + 0.001 * rng.standard_normal())
+    assert summarise(found)["loop"]["units"] == len(found)
+
+
 def test_units_that_cannot_be_compared_are_left_out_and_counted(steady):
     found = units(steady)
     changes = {"converged": False, "forced": True, "rated_torque_Nm": 2.0, "amplitude_Nm": 0.5, "loop_area_J": None}

@@ -171,6 +171,22 @@ def test_what_is_no_fault_of_the_unit_is_tried_again(fleet, tmp_path, error, aga
         assert job.has(unit, job.stamp(unit)) != again
 
 
+def test_a_posterior_of_before_does_not_stay_beside_another_result(fleet, tmp_path):
+    """Made with posteriors, anew without, and with them again: what is there then rests on the present files."""
+    unit, made = find_units(fleet, tmp_path)[0], []
+
+    def work(path, folder):
+        if folder is not None:
+            folder.mkdir(parents=True)
+        made.append(folder)
+        return [{"unit": "u"}]
+
+    with locked(tmp_path):
+        for seed, posteriors in ((0, True), (1, False), (1, True)):
+            carry_out(Job(tmp_path, work, seed=seed, posteriors=posteriors), unit)
+    assert [folder is not None for folder in made] == [True, False, True]
+
+
 def test_a_unit_whose_worker_dies_once_is_worked_on_again(two_workers, fleet, tmp_path, undisturbed):
     out, tally = run(two_workers, fleet, tmp_path / "out", Dies(tmp_path, ("u-3",), times=1))
     assert (tmp_path / "u-3.deaths").stat().st_size == 1

@@ -86,6 +86,8 @@ def test_units_that_cannot_be_compared_are_left_out_with_the_reason(brief):
     assert [(row["unit"], row["why"]) for row in found["left_out"]] == [
         ("odd", "another rated torque or k"), ("bad", "not converged, or forced"),
     ]  # fmt: skip
+    read = [replace(unit, rated_torque_nm=unit.rated_torque_nm * (1 + 0.001 * k)) for k, unit in enumerate(brief)]
+    assert not pool_batch("spring", read, 3)["left_out"], "of bare records the largest torque read stands for T_r"
     with pytest.raises(BadInput, match=r"at least 5 units that can be pooled, found 4 of 4"):
         pool_batch("spring", brief[:4])
 
