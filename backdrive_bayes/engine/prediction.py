@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from backdrive_bayes.engine.one_thread import one_thread
@@ -97,5 +99,7 @@ def _from(posterior, time, torque, rate, preload_nm):
     before = torque[:1] if np.isnan(preload_nm) else np.array([0.0, preload_nm, torque[0]])
     ramp = np.abs(np.diff(before)) / rate
     early = time[0] - np.r_[np.cumsum(ramp[::-1])[::-1], 0.0]
-    history = through(np.r_[early, time], np.r_[before, torque], posterior.context.torque_scale_nm)
+    scale = posterior.context.torque_scale_nm
+    # A record has the thresholds of its own amplitude, whatever went before it.
+    history = replace(through(np.r_[early, time], np.r_[before, torque], scale), largest=float(np.abs(torque).max()) / scale)
     return posterior.angles(history, rate)[:, -torque.size :]

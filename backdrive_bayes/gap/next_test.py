@@ -48,19 +48,21 @@ def _tests(linear):
 
 
 def _path(turning, rate, dwell_s=0.0) -> History:
-    torque = np.concatenate(
-        [np.linspace(a, b, POINTS)[:-1] for a, b in zip(turning[:-1], turning[1:], strict=True)] + [turning[-1:]]
-    )
+    legs = [np.linspace(a, b, POINTS) for a, b in zip(turning[:-1], turning[1:], strict=True)]
+    if not dwell_s:
+        legs = [*(leg[:-1] for leg in legs[:-1]), legs[-1]]
+    torque, leg = np.concatenate(legs), np.repeat(np.arange(len(legs)), [leg.size for leg in legs])
     time = np.r_[0.0, np.cumsum(np.abs(np.diff(torque)))] / rate
-    leg = np.repeat(np.arange(turning.size - 1), POINTS - 1)
-    return through(time + dwell_s * np.r_[0, leg], torque, 1.0)
+    return through(time + dwell_s * leg, torque, 1.0)
 
 
 def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
     """Angle at the segments' ends that a hypothesis expects, in shares of the angle scale."""
     linear = fitted.linear
     weights, context = linear.design.split(fitted.mean), linear.reduced.context
-    log_rate = np.log(rate) - np.log(context.rate).mean() + history.surge
+    # What a history surges beyond is its mean rate, rests among it.
+    mean_rate = np.abs(history.z1 - history.z0).sum() / (history.t1[-1] - history.t0[0])
+    log_rate = np.log(mean_rate) - np.log(context.rate).mean() + history.surge
     growth = linear.distortion.growth(log_rate, history.log_amplitude, context)
     base = linear.reducer.ends(history, growth)
     mean = {n: weights[n] for n in base}

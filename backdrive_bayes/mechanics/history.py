@@ -29,8 +29,8 @@ class History:
     [s], ``block``
     the block that a segment belongs to and ``weight`` its share of the block's time. ``surge`` is the logarithm of the loading
     rate over the history's mean rate at the segments' ends, (2, segments), or zero where it is the same everywhere. ``state`` is
-    the one of
-    :data:`backdrive_bayes.mechanics.cells.START` in which it begins.
+    the one of :data:`backdrive_bayes.mechanics.cells.START` in which it begins. ``largest`` is the torque whose thresholds it
+    has, by default its own largest.
     """
 
     z0: np.ndarray
@@ -42,6 +42,7 @@ class History:
     blocks: int
     surge: np.ndarray | float = 0.0
     state: str = "neutral"
+    largest: float | None = None
 
     @property
     def start(self) -> float:
@@ -51,7 +52,8 @@ class History:
     @cached_property
     def log_amplitude(self) -> float:
         """Logarithm of the largest torque in shares of the unit's."""
-        return float(np.log(max(np.abs(self.z0).max(), np.abs(self.z1).max(), 1e-3)))
+        largest = self.largest or max(np.abs(self.z0).max(), np.abs(self.z1).max())
+        return float(np.log(max(largest, 1e-3)))
 
     def mean(self, begin, end) -> np.ndarray:
         """Block means (blocks, columns) of quantities that are straight on every segment, given at its ends

@@ -1,5 +1,7 @@
 """Prediction of torque histories: the known reducer's angle within its interval, honest at the ends of what was measured."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.made_posterior import OFFSET, known, made_posterior
@@ -28,6 +30,24 @@ def test_an_unknown_state_is_wider_until_the_first_large_torque():
     time, torque = minor_loops()
     rest, unknown = (predict_angles(made_posterior(), time, torque, s).std(axis=0) for s in ("rest", "unknown"))
     assert unknown[0] > 10 * rest[0] and unknown[-1] < 1.3 * rest[-1]
+
+
+def test_what_went_before_does_not_change_thresholds(monkeypatch):
+    """Thresholds follow the amplitude of what is asked: a settled small loop is the same after rest and after a full load. The
+    planted fault takes the largest torque there ever was."""
+    posterior = made_posterior()
+    posterior = replace(posterior, distortion=replace(posterior.distortion, friction_amplitude=0.3, drag_amplitude=0.3))
+    time = np.linspace(0, 60, 1201)
+    torque = 0.03 * np.interp(time, np.arange(0, 61, 10), [0, 1, -1, 1, -1, 1, 0])
+
+    def apart():
+        loops = [prediction._from(posterior, time, torque, 0.005, preload)[:20, 600:1000] for preload in (np.nan, 0.1)]
+        one, other = (loop - loop.mean(axis=1, keepdims=True) for loop in loops)
+        return np.abs(one - other).max() / np.abs(one).max()
+
+    assert apart() < 1e-6
+    monkeypatch.setattr(prediction, "replace", lambda history, **given: history)
+    assert apart() > 1e-2
 
 
 def test_a_history_that_starts_under_load_and_one_that_rests_are_finite():

@@ -227,6 +227,18 @@ def test_the_closed_fraction_has_its_ends():
     assert closed_fraction(4.0, 100.0, 1.0) == -1.0 and closed_fraction(1.0, 0.0, 1.0) == 1.0
 
 
+def test_a_dwell_that_is_proposed_is_one_and_has_the_rate_of_its_ramps():
+    """The torque rests at each tip, and thresholds follow the rate of the ramps on either side, not a multiple of it."""
+    turning, rate = np.array([0.0, 1.0, -1.0, 1.0]), 0.5
+    plain, dwells = (next_test._path(turning, rate, seconds) for seconds in (0.0, 30.0))
+    rests = (dwells.t1 - dwells.t0) > 29.0
+    assert rests.sum() == 2 and np.all(dwells.z0[rests] == dwells.z1[rests]) and np.all(np.abs(dwells.z0[rests]) == 1.0)
+    assert plain.t1[-1] == pytest.approx(10.0) and dwells.t1[-1] == pytest.approx(70.0)
+    mean = np.abs(dwells.z1 - dwells.z0).sum() / dwells.t1[-1]
+    ramp = np.exp(np.log(mean) + np.broadcast_to(dwells.surge, (2, rests.size)))[:, np.abs(dwells.z1) < 0.5]
+    assert ramp == pytest.approx(rate, rel=1e-6)
+
+
 def test_loops_that_are_proposed_stay_within_the_angles_that_were_measured():
     """At turning points the torque stands still: a slope there must not divide by nothing."""
     linear = prepared("sensor_lag")[0]
