@@ -96,7 +96,7 @@ def _ask(claim, units, quantities):
     """Draws of the answer (draws,), and the numbers behind it."""
     same_lost_motion([units[u] for u in claim.holds.asked_of("lost_motion_rad")])
     rates = _rates(claim, units)
-    loaded = [units[u] for u in {u for name in LOADED for u in claim.holds.asked_of(name)}]
+    loaded = [units[u] for u in sorted({u for name in LOADED for u in claim.holds.asked_of(name)})]
     same_load(loaded, [e.loop(e.rates[-1], claim.amplitude).amplitude for e in loaded])
     contexts = [rates] if claim.along == "rate" else [[r] for r in (rates if claim.every == "rate" else [_one(claim, rates)])]
     held, numbers = [], []

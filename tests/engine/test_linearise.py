@@ -481,9 +481,9 @@ def test_a_law_that_another_search_came_upon_speaks_for_no_effect(searching):
 
 
 def test_a_search_ends_at_derivatives_of_its_own(monkeypatch):
-    """From where it ended no more is found. One step away from nothing the line of the model before promises a fifth of a nat;
-    where that line is never made anew (planted fault), it ends there."""
-    free = search.Search(reduce_unit(planted(3, offset_nm=-3e-4)), library_terms(), BASELINE)
+    """From where it ended no more is found. One step away from nothing the line of the model before promises little; where that
+    line is never made anew (planted fault), it ends there."""
+    free = search.Search(reduce_unit(planted(2, offset_nm=2e-3)), library_terms(), BASELINE)
     like = free.first(Distortion())
     ended = free.find_mode(like, Distortion())
     assert free.find_mode(like, ended.distortion).log_marginal < ended.log_marginal + 2.0
