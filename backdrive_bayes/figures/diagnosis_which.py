@@ -44,4 +44,7 @@ def draw_bars(axes, saved: Diagnosed) -> None:
     axes.tick_params(axis="y", length=0)
     if any(h.in_set for h in shown):
         patch = matplotlib.patches.Patch(color=BLUE, label="90 % credible set")
-        axes.legend(handles=[patch], loc="lower right", borderaxespad=0.1, handlelength=1.2)
+        # Where the shortest bar leaves most room.
+        _, free = min((h.probability, -y) for y, h in zip(places, shown, strict=True))
+        at = {"loc": "center right", "bbox_to_anchor": (1.22, -free), "bbox_transform": axes.transData}
+        axes.legend(handles=[patch], borderaxespad=0.1, handlelength=1.2, **at)
