@@ -271,9 +271,9 @@ def _evidence(fitted, k: float | None = None, examined: bool = False) -> Evidenc
         return fitted
     if not isinstance(fitted, record.Unit) and is_result(Path(fitted)):
         return Evidence.read(Path(fitted))
-    options = {} if k is None else {"k": k}
-    found = fit(fitted, **options).evidence
-    return replace(found, diagnosis=diagnose(fitted, **options).result) if examined else found
+    k = k or FitOptions.k
+    found = fit(fitted, k=k).evidence
+    return replace(found, diagnosis=diagnose(fitted, k=k).result) if examined else found
 
 
 def _save(result, name, folder, figures):

@@ -10,6 +10,7 @@ import warnings
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from conftest import ramps, write_csv  # isort: skip
 import backdrive_bayes
 import backdrive_bayes.api
 from backdrive_bayes.decisions.limits import Limit, Limits
+from backdrive_bayes.errors import BadInput
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -64,6 +66,21 @@ def test_report_can_be_called_however_it_was_found(tmp_path):
     assert dressed.read_bytes() != (tmp_path / "report.pdf").read_bytes()
     import_module("backdrive_bayes.report.report")
     assert backdrive_bayes.report(verdict, out=tmp_path / "again").exists()
+
+
+def test_a_unit_is_fitted_at_the_share_that_its_limits_name(monkeypatch):
+    """The planted fault fits at 0.03 whatever they say, and then refuses them."""
+    asked = []
+
+    def made(**found):
+        return lambda unit, **options: (asked.append(options), SimpleNamespace(**found))[1]
+
+    monkeypatch.setattr(backdrive_bayes.api, "fit", made(evidence=evidence(k=0.04)))
+    monkeypatch.setattr(backdrive_bayes.api, "diagnose", made(result=None))
+    verdict = backdrive_bayes.api.accept("unit", Limits((Limit("lost_motion_rad", hi=1.0, k=0.04),)))
+    assert verdict.verdict == "accepted" and asked == [{"k": 0.04}] * 2
+    with pytest.raises(BadInput, match="one k for all limits"):
+        backdrive_bayes.api.accept("unit", Limits(tuple(Limit("lost_motion_rad", hi=1.0, k=k) for k in (0.03, 0.04))))
 
 
 def test_unknown_names_are_attribute_errors():

@@ -24,5 +24,6 @@ def most_alike(torques) -> float:
     """The one of several torques that most others are the same as; of several such the first."""
     values = np.asarray(torques, float)
     rising = np.sort(values)
-    ends = (np.searchsorted(rising, values * (1 + sign * SAME_AMPLITUDE), side) for sign, side in ((1, "right"), (-1, "left")))
-    return float(values[np.argmax(np.subtract(*ends))])
+    first = np.searchsorted(rising, values * (1 - SAME_AMPLITUDE), "left")
+    last = np.searchsorted(rising, values * (1 + SAME_AMPLITUDE), "right")
+    return float(values[np.argmax(last - first)])
