@@ -215,7 +215,7 @@ def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:
     models = list(fitted) if isinstance(fitted, list | tuple) else [fitted]
     name = "" if isinstance(limits, Limits) else Path(limits).name
     limits = limits if isinstance(limits, Limits) else read_limits(limits)
-    k = limits.only_k(name)
+    k = limits.only_k(name) or FitOptions.k
     evidences = [_evidence(m, k, examined=True) for m in models]
     others = Pool.read(Path(batch)) if isinstance(batch, str | Path) else [_evidence(b, k) for b in batch]
     result = assess(evidences, limits, probabilities, others) | collected([evidences[0].about])
@@ -260,9 +260,8 @@ def _fitted(ready, posterior, indicators) -> Fit:
     return Fit(posterior, indicators)
 
 
-def _evidence(fitted, k: float | None = None, examined: bool = False) -> Evidence:
-    """Draws to decide on; a unit is fitted for them with the lost motion at ``k`` T_r, and diagnosed where it is to be
-    ``examined``."""
+def _evidence(fitted, k: float = FitOptions.k, examined: bool = False) -> Evidence:
+    """Draws to decide on; a unit is fitted for them, its lost motion at ``k`` T_r, and diagnosed where it is ``examined``."""
     if isinstance(fitted, Fit):
         return fitted.evidence
     if isinstance(fitted, Diagnosis):
@@ -271,7 +270,6 @@ def _evidence(fitted, k: float | None = None, examined: bool = False) -> Evidenc
         return fitted
     if not isinstance(fitted, record.Unit) and is_result(Path(fitted)):
         return Evidence.read(Path(fitted))
-    k = k or FitOptions.k
     found = fit(fitted, k=k).evidence
     return replace(found, diagnosis=diagnose(fitted, k=k).result) if examined else found
 
