@@ -47,7 +47,8 @@ second unit of this project's four benches (`studies/make_bench.py --units 60 --
 these first runs gave stands in docs/shown.md). Of the first two every fourth unit is here, of the third 16 of these, of the
 eighth and ninth every second (of odd number), of the tenth all. All rows on this page are of one
 code, the last but one: derivatives by an offset and a lag were one-sided, and records were given a wander in turn, so that a unit
-upside down or in another order could come out otherwise.
+upside down or in another order could come out otherwise. Of 40 units, drawn at random from the own benches and
+the foreign one, none has another answer with the code since, and their log score went from -0.81 to -0.75.
 
 What the last changes did to these scores: with a drag at the shaft in the law of the rate (31 units of ten benches in view) the
 mean log score of those units rose from -3.2 to -2.6. With flanks that may differ in all that they turn (52 units in view) that
