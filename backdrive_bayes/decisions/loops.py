@@ -11,6 +11,7 @@ from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
 SMALLEST = 0.05
 """Smallest amplitude that is predicted, as a share of the measured one."""
 ROUNDING = 1e-9
+"""Share by which the smallest amplitude, asked for as a share of the largest, may miss it."""
 
 
 class NotAvailable(Exception):

@@ -52,7 +52,7 @@ class History:
     @cached_property
     def log_amplitude(self) -> float:
         """Logarithm of the largest torque in shares of the unit's."""
-        largest = self.largest or max(np.abs(self.z0).max(), np.abs(self.z1).max())
+        largest = max(np.abs(self.z0).max(), np.abs(self.z1).max()) if self.largest is None else self.largest
         return float(np.log(max(largest, 1e-3)))
 
     def mean(self, begin, end) -> np.ndarray:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.records.branches import Branch, Segment
-from backdrive_bayes.records.turning import block_means
+from backdrive_bayes.records.turning import LINE_POINTS, block_means
 
 _FULL = 0.8  # reversals of at least this share of the largest count for the amplitude
 _TIP = 0.05  # share of the amplitude next to a tip on which its angle is read
 _RESTS = 40  # beginnings of a rest that are tried: apart by less than half a percent of the torque of a leg
-_LEG_POINTS = 1000  # block means lose nothing of a straight line
 
 
 def turning_levels(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> np.ndarray:
@@ -33,7 +32,7 @@ def _reached(time_s: np.ndarray, torque_nm: np.ndarray) -> float:
     if len(time_s) < 3:
         return float(torque_nm.mean())
     stop = time_s[-1] + 0.5 * float(np.median(np.diff(time_s)))
-    block = max(1, len(time_s) // _LEG_POINTS)
+    block = max(1, len(time_s) // LINE_POINTS)
     time, torque = (block_means(values[len(values) % block :], block) for values in (time_s, torque_nm))
     count = len(time)
     rests = stop - (stop - time[0]) * np.arange(_RESTS if count > 4 else 1) / _RESTS  # the first of them is no rest

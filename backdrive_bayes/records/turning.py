@@ -11,7 +11,7 @@ SHARE = 0.05  # a reversal smaller than this share of the peak-to-peak torque is
 _MAIN_SHARE = 0.35  # reversals of this share set the length of a typical segment
 _NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the smoothed noise is noise
 _BLOCKS_PER_SEGMENT = 64
-_LINE_POINTS = 2000  # block means lose nothing of a straight line
+LINE_POINTS = 2000  # block means lose nothing of a straight line
 _TOP_SHARE = 0.003  # a turning point lies no further below the top, in shares of the range
 _MEDIAN_BLOCKS = 9  # kills disturbances shorter than a fourteenth of a segment: a motor's surge across a clearance
 
@@ -167,7 +167,7 @@ def _percentile(values: np.ndarray, percent):
 
 def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     """Line (time origin, level there, slope) through the samples, outliers trimmed once."""
-    block = max(1, len(x) // _LINE_POINTS)
+    block = max(1, len(x) // LINE_POINTS)
     x, y = block_means(x, block), block_means(y, block)
     origin = float(x.mean())
     level, slope = _least_squares(x - origin, y)
