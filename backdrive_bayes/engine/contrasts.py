@@ -22,6 +22,13 @@ WIDENED = 5.0
 SIZES = np.exp([-1.5, 0.0, 1.5])
 """Sizes of an effect over its usual one, averaged over with these weights: """
 SIZE_WEIGHTS = np.array([0.25, 0.5, 0.25])
+BARRED = -1e4
+"""Log probability of what there is not: so small that nothing makes up for it, and finite."""
+
+
+def nothing_barred(means) -> np.ndarray:
+    """That there is anything, whatever the weights (…, width): (…,)."""
+    return np.zeros(np.shape(means)[:-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +91,9 @@ class Contrasts:
         half a normal prior, each counted as if it were the only one."""
         return float(self.log_marginals(scale, np.empty(0, int), np.empty((1, 0)), one_way)[0])
 
-    def log_marginals(self, scale, columns, sizes, one_way: Sequence[int] = ()) -> np.ndarray:
-        """The same where weights of further ``columns`` (width,) have each of ``sizes`` (n, width) in turn."""
+    def log_marginals(self, scale, columns, sizes, one_way: Sequence[int] = (), barred=nothing_barred) -> np.ndarray:
+        """The same where weights of further ``columns`` (width,) have each of ``sizes`` (n, width) in turn; ``barred`` says of
+        their means (…, width) whether there is no such thing."""
         on, lower, seen = self._solved(scale)
         across = solve_triangular(lower, scale[on, None] * self.gram[np.ix_(on, columns)], lower=True, check_finite=False)
         rest, left = self.gram[np.ix_(columns, columns)] - across.T @ across, self.moment[columns] - across.T @ seen
@@ -97,6 +105,7 @@ class Contrasts:
             further = np.linalg.solve(more, size * left)
             chi2 = max(base - float(further @ further), 0.0)
             log = -0.5 * dof * np.log1p(chi2 / self.noise_dof) - volume - float(np.log(np.diag(more)).sum())
+            log += BARRED * float(barred(size * np.linalg.solve(more.T, further)))
             for own in along:
                 beyond = -np.linalg.solve(more, size * (across.T @ own))
                 spread = np.sqrt((self.noise_dof + chi2) / dof) * np.hypot(np.linalg.norm(own), np.linalg.norm(beyond))
@@ -104,9 +113,9 @@ class Contrasts:
             found.append(log)
         return np.array(found)
 
-    def gains(self, scale, columns, sizes) -> np.ndarray:
+    def gains(self, scale, columns, sizes, barred=nothing_barred) -> np.ndarray:
         """Gain in log marginal likelihood of each member (members, width) of further ``columns`` whose weights have standard
-        deviations ``sizes``, beside the first weights, of ``scale``; averaged over SIZES."""
+        deviations ``sizes``, beside the first weights, of ``scale``; averaged over SIZES, ``barred`` as above."""
         whole = np.unique(columns)
         at = np.searchsorted(whole, columns)
         own, lower, seen = self._solved(scale)
@@ -121,7 +130,8 @@ class Contrasts:
             inner = np.eye(columns.shape[1]) + size**2 * gram
             solved = np.linalg.solve(inner, left[:, :, None])[:, :, 0]
             less = np.minimum(size**2 * np.sum(left * solved, axis=1), chi2)
-            found.append(-0.5 * dof * np.log1p(-less / (self.noise_dof + chi2)) - 0.5 * np.linalg.slogdet(inner)[1])
+            gain = -0.5 * dof * np.log1p(-less / (self.noise_dof + chi2)) - 0.5 * np.linalg.slogdet(inner)[1]
+            found.append(gain + BARRED * barred(size**2 * sizes * solved))
         return logsumexp(found, axis=0, b=SIZE_WEIGHTS[:, None])
 
     def chi2(self, scale) -> float:

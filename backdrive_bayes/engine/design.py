@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from backdrive_bayes.engine.marginal import Scales
-from backdrive_bayes.engine.reduced import Reduced
+from backdrive_bayes.engine.reduced import BlockMeans
 from backdrive_bayes.mechanics.effect import (
     AngleEffect,
     Distortion,
@@ -104,18 +104,18 @@ _history = lru_cache(maxsize=16)(of_blocks)
 """Histories of the distortion at hand are wanted again and again."""
 
 
-def histories(reduced: Reduced, distortion: Distortion) -> list[History]:
+def histories(reduced: BlockMeans, distortion: Distortion) -> list[History]:
     """Torque histories of all records as the reducer felt them."""
     return [_history(b, reduced.torque_scale_nm, distortion.offset, distortion.lag_s) for b in reduced.blocks]
 
 
-def grown_histories(reduced: Reduced, distortion: Distortion) -> list[tuple[History, tuple]]:
+def grown_histories(reduced: BlockMeans, distortion: Distortion) -> list[tuple[History, tuple]]:
     """The same, each with the growth of thresholds along it."""
     rates = zip(histories(reduced, distortion), reduced.context.log_rate, strict=True)
     return [(history, distortion.growth(rate + history.surge, history.log_amplitude, reduced.context)) for history, rate in rates]
 
 
-def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion) -> Design:
+def class_groups(reduced: BlockMeans, reducer: ReducerClass, distortion: Distortion) -> Design:
     """Columns of the class at a distortion."""
     found: dict[str, list] = {}
     for history, growth in grown_histories(reduced, distortion):
@@ -124,7 +124,7 @@ def class_groups(reduced: Reduced, reducer: ReducerClass, distortion: Distortion
     return Design(tuple(Group(n, tuple(c)) for n, c in found.items()))
 
 
-def class_prediction(reduced: Reduced, reducer: ReducerClass, distortion: Distortion, weights) -> list[np.ndarray]:
+def class_prediction(reduced: BlockMeans, reducer: ReducerClass, distortion: Distortion, weights) -> list[np.ndarray]:
     """The same times ``weights`` by group, without the columns."""
     return [reducer.predict(history, weights, growth) for history, growth in grown_histories(reduced, distortion)]
 
@@ -145,7 +145,7 @@ def effect_columns(effect, reducer, history: History, weights, growth, turned, c
     return effect.columns(turned) if isinstance(effect, AngleEffect) else None
 
 
-def path_group(reduced: Reduced, effect: PathEffect, distortion: Distortion = UNDISTORTED) -> Group:
+def path_group(reduced: BlockMeans, effect: PathEffect, distortion: Distortion = UNDISTORTED) -> Group:
     """Columns of an effect that follows from the torque history, as the reducer felt it; its prior scale is its own."""
     columns = []
     for r, history in enumerate(histories(reduced, distortion)):

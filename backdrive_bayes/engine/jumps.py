@@ -72,7 +72,8 @@ def residual_series(linear: Linear, wave: float | None = None) -> list[Teeth]:
         width = max(1, round(noise.correlation_time_s / SAMPLES / step))
         series = even_series((rest * blocks.direction[blocks.leg[block]])[moves], leg[moves], width)
         if series is not None:
-            rate = float(reduced.context.rate[r]) / (1.0 - share)
+            travel, moving = np.abs(np.diff(blocks.turning_nm)).sum(), (1.0 - share) * reduced.context.duration_s[r]
+            rate = float(travel / moving / reduced.torque_scale_nm)
             # Correlated noise as it was estimated holds the teeth themselves.
             found.append(Teeth(series, width * step * rate, TRACE * noise.white_rad))
     return found

@@ -73,11 +73,17 @@ def periodic_group(linear: Linear, frequency: float) -> Group:
 
 
 def rises(linear: Linear, frequency: float) -> bool:
-    """Whether the reading rises with the angle everywhere beside the wave that the linear model holds: one that turns it back is
-    no encoder's, it draws the loop itself anew."""
-    height = np.linalg.norm(linear.weights[WAVE].reshape(-1, HARMONICS, 2), axis=2)
-    steepest = 2.0 * np.pi * frequency * np.max(height @ (1.0 / np.arange(1, HARMONICS + 1)))
-    return bool(steepest < 1.0)
+    """Whether the reading rises with the angle everywhere beside the wave that the linear model holds."""
+    order = np.repeat(np.arange(1, HARMONICS + 1), 2)
+    return not turns_back((linear.weights[WAVE].reshape(-1, 2 * HARMONICS) / order**2).ravel(), frequency)
+
+
+def turns_back(weights, frequency) -> np.ndarray:
+    """Whether waves with ``weights`` (…, 2 HARMONICS phases) of sine and cosine at ``frequency`` (…,) and its multiples turn the
+    reading back: no encoder does, such a wave draws the loop itself anew."""
+    height = np.linalg.norm(np.reshape(weights, (*np.shape(weights)[:-1], -1, HARMONICS, 2)), axis=-1)
+    steepest = (height @ np.arange(1, HARMONICS + 1)).max(axis=-1)
+    return 2.0 * np.pi * np.asarray(frequency) * steepest >= 1.0
 
 
 def with_wave(linear: Linear, frequency: float) -> Linear:

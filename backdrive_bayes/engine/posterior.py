@@ -10,7 +10,7 @@ import numpy as np
 from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, GrowthEffect
-from backdrive_bayes.mechanics.history import History, through
+from backdrive_bayes.mechanics.history import History, loading_rate, through
 from backdrive_bayes.mechanics.reducer import ReducerClass
 
 
@@ -128,11 +128,10 @@ class Posterior:
     def along(self, time_s, torque_nm) -> np.ndarray:
         """Angles [rad] for a torque history, (draws, samples), zero at the first sample's neutral state."""
         torque = np.asarray(torque_nm, float)
-        span = float(time_s[-1] - time_s[0])
-        rate = float(np.abs(np.diff(torque)).sum() / span) if span > 0 else float(self.records.rate_nm_per_s[0])
+        rate = loading_rate(time_s, torque) or float(self.records.rate_nm_per_s[0])
         start = np.r_[torque[:1], torque]
         history = through(np.r_[time_s[:1], time_s], start, self.context.torque_scale_nm)
-        return self.angles(history, max(rate, 1e-12))
+        return self.angles(history, rate)
 
     def _log_rate(self, rate_nm_per_s) -> float:
         measured = self.records.rate_nm_per_s

@@ -10,7 +10,7 @@ from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.predictive import block_offsets
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.history import loading_rate, through
 from backdrive_bayes.mechanics.part import TOP
 
 MOST_NODES = 20_000
@@ -32,9 +32,7 @@ def predict_angles(posterior: Posterior, time_s, torque_nm, start: str = "unknow
     """
     at = nodes(torque_nm)
     time, torque = np.asarray(time_s, float)[at], np.asarray(torque_nm, float)[at]
-    span = time[-1] - time[0]
-    rate = float(np.abs(np.diff(torque)).sum() / span)
-    rate = rate if rate > 0 else float(posterior.records.rate_nm_per_s[0])
+    rate = loading_rate(time, torque) or float(posterior.records.rate_nm_per_s[0])
     some = posterior.thinned(-(-draws // posterior.shape[0]))
     preloads = PRELOADS if start == "unknown" else np.array([np.nan])
     offsets = np.array(block_offsets(posterior))
@@ -78,13 +76,11 @@ def range_caveat(posterior: Posterior, torque_nm) -> str:
 def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:
     """What is to be kept in mind of a history's loading rate, beside those measured; empty where it is among them.
 
-    The rate is the mean of |dτ/dt| while the torque moves. From one rate alone nothing is learnt of how friction grows with it.
+    From one rate alone nothing is learnt of how friction grows with it.
     """
-    steps, seconds = np.abs(np.diff(torque_nm)), np.diff(time_s)
-    moving = steps > 0.0
-    if not moving.any():
+    rate = loading_rate(time_s, torque_nm)
+    if not rate:
         return ""
-    rate = float(steps[moving].sum() / seconds[moving].sum())
     low, high = (float(end(posterior.records.rate_nm_per_s)) for end in (np.min, np.max))
     lone = high < LONE_RATE_REACH * low
     reach = LONE_RATE_REACH if lone else RATE_REACH

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.engine.covariance import whitener
-from backdrive_bayes.engine.design import effect_columns
+from backdrive_bayes.engine.design import class_groups, path_group, tangent_groups
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.reduced import BlockMeans, Jitter
-from backdrive_bayes.mechanics.history import of_blocks
+from backdrive_bayes.mechanics.effect import PathEffect
 
 REPLICATES_A_CHAIN = 50
 
@@ -41,29 +41,20 @@ def replicates(posterior: Posterior) -> np.ndarray:
     some = posterior.thinned(REPLICATES_A_CHAIN)
     rng = np.random.default_rng([posterior.seed, 6])
     out = []
-    for r, (covariance, offset) in enumerate(zip(covariances_rad2(posterior), block_offsets(posterior), strict=True)):
+    each = zip(posterior.predicted_rad, covariances_rad2(posterior), block_offsets(posterior), _departures(some), strict=True)
+    for predicted, covariance, offset, away in each:
         noise = rng.standard_normal((*some.shape, covariance.shape[0])) @ np.linalg.cholesky(covariance).T
-        out.append(posterior.predicted_rad[r] + offset + _departures(some, r).reshape(noise.shape) + noise)
+        out.append(predicted + offset + away.reshape(noise.shape) + noise)
     return np.concatenate(out, axis=-1).astype(np.float32)
 
 
-def _departures(posterior: Posterior, record: int) -> np.ndarray:
-    """Prediction of each draw less the draws' mean [rad], (draws, blocks); of the reducer and of the record's own columns."""
-    context, distortion = posterior.context, posterior.distortion
-    blocks, own = posterior.records.blocks[record], posterior.records
-    history = of_blocks(blocks, context.torque_scale_nm, distortion.offset, distortion.lag_s)
-    growth = distortion.growth(context.log_rate[record] + history.surge, history.log_amplitude, context)
-    columns = posterior.reducer.columns(history, growth)
-    mean = {n: posterior.flat[n].mean(axis=0) for n in columns}
-    shared = posterior.reducer, history, mean, growth, sum(columns[n] @ mean[n] for n in mean), context, record
-    for effect in (e for e in posterior.effects if e.name in posterior.flat):
-        if (by := effect_columns(effect, *shared)) is not None:
-            columns[effect.name] = by
-    per_record = {e.name for e in posterior.effects if e.per_record}
-    found = np.zeros(())
-    for name, column in columns.items():
-        weights = posterior.flat[name]
-        if name in per_record:
-            weights = np.split(weights, own.count, axis=1)[record]
-        found = found + (weights - weights.mean(axis=0)) @ column.T
-    return found * context.angle_scale_rad
+def _departures(posterior: Posterior) -> list[np.ndarray]:
+    """Prediction of each draw less the draws' mean [rad], (draws, blocks) for each record."""
+    reduced, at = BlockMeans(posterior.records.blocks, posterior.records.noise), posterior.distortion
+    design, mean = class_groups(reduced, posterior.reducer, at), {n: w.mean(axis=0) for n, w in posterior.flat.items()}
+    drawn = tuple(e for e in posterior.effects if e.name in posterior.flat)
+    groups = (*design.groups, *(path_group(reduced, e, at) for e in drawn if isinstance(e, PathEffect)))
+    groups += tangent_groups(reduced, posterior.reducer, design, at, mean, drawn)
+    away = {g.name: posterior.flat[g.name] - mean[g.name] for g in groups}
+    scale = posterior.context.angle_scale_rad
+    return [scale * sum(away[g.name] @ g.of_record(r).T for g in groups) for r in range(posterior.records.count)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from backdrive_bayes.engine.covariance import channel_covariance, local_slope, path_covariance
 from backdrive_bayes.mechanics.effect import Context
+from backdrive_bayes.mechanics.history import loading_rate
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
@@ -81,13 +82,12 @@ class BlockMeans:
     def context(self) -> Context:
         """Rates, durations and noise levels."""
         duration = np.array([b.end_s[-1] - b.begin_s[0] for b in self.blocks])
-        travel = np.array([np.abs(np.diff(b.turning_nm)).sum() for b in self.blocks])
         angle = [np.hypot(n.correlated_rad, WHITE_SHARE * n.white_rad) for n in self.noise]
         torque = [n.torque_nm for n in self.noise]
         return Context(
             self.torque_scale_nm,
             self.angle_scale_rad,
-            travel / duration / self.torque_scale_nm,
+            np.array([loading_rate(b.path_s, b.path_nm) for b in self.blocks]) / self.torque_scale_nm,
             duration,
             float(np.median(angle)) / self.angle_scale_rad,
             max(float(np.median(torque)) / self.torque_scale_nm, 1e-5),

@@ -60,9 +60,7 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
     """Angle at the segments' ends that a hypothesis expects, in shares of the angle scale."""
     linear = fitted.linear
     weights, context = linear.design.split(fitted.mean), linear.reduced.context
-    # What a history surges beyond is its mean rate, rests among it.
-    mean_rate = np.abs(history.z1 - history.z0).sum() / (history.t1[-1] - history.t0[0])
-    log_rate = np.log(mean_rate) - np.log(context.rate).mean() + history.surge
+    log_rate = np.log(rate) - np.log(context.rate).mean() + history.surge
     growth = linear.distortion.growth(log_rate, history.log_amplitude, context)
     base = linear.reducer.ends(history, growth)
     mean = {n: weights[n] for n in base}

@@ -18,6 +18,7 @@ from backdrive_bayes.gap.averaged import posterior_of
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
 from backdrive_bayes.indicators.same_loop import same_rate
+from backdrive_bayes.mechanics.history import loading_rate
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
@@ -166,7 +167,7 @@ def _predicted(posterior: Posterior, blocks: Blocks) -> np.ndarray:
     share = np.r_[0.0, NODES]
     torque = (low + (high - low) * share[:, None]).T.ravel()
     time = (blocks.begin_s + (blocks.end_s - blocks.begin_s) * share[:, None]).T.ravel()
-    first, rate = blocks.turning_nm[0], _travel(blocks) / (blocks.end_s[-1] - blocks.begin_s[0])
+    first, rate = blocks.turning_nm[0], loading_rate(blocks.path_s, blocks.path_nm)
     before = np.array([0.0, -first] if abs(first) >= 0.9 * np.abs(blocks.turning_nm).max() else [])
     early = time[0] - np.cumsum(np.abs(np.diff(np.r_[before, first]))[::-1])[::-1] / rate
     angle = posterior.thinned(50).along(np.r_[early, time], np.r_[before, torque]).mean(axis=0)

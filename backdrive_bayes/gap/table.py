@@ -5,16 +5,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import logsumexp
 
-from backdrive_bayes.engine.contrasts import SIZES, Contrasts, averaged, effect_groups, make_contrasts
+from backdrive_bayes.engine.contrasts import SIZES, Contrasts, averaged, effect_groups, make_contrasts, nothing_barred
 from backdrive_bayes.engine.design import Group, path_group
 from backdrive_bayes.engine.jumps import Jumps
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.log_mean import log_mean
-from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, wave_group
+from backdrive_bayes.engine.periodic import AMPLITUDE, coarse_bank, fine_bank, log_prior, phases, turns_back, wave_group
 from backdrive_bayes.engine.traces import trace_levels, usual_level, wave_trace
 from backdrive_bayes.engine.unlisted import bump_groups, module_group, ratchet_group, step_group, uneven_group
 from backdrive_bayes.mechanics.effect import Effect, TangentEffect
@@ -163,10 +164,11 @@ class Table:
     def _sized(self, on, at, columns, sizes) -> list[float]:
         """Log marginal likelihoods beside the terms ``on``, averaged over their size, for each of ``sizes`` (width, n) of further
         ``columns``, of the waves about one of the coarse bank where ``at`` says which."""
-        found = []
+        found, barred = [], nothing_barred if at is None else partial(turns_back, frequency=self.coarse.members[at])
         for size in SIZES if on else (1.0,):
             contrasts = self._about(at, self._unlisted(on, size))
-            found.append(contrasts.log_marginals(self.scale(on, size), columns, np.transpose(sizes), self._one_way(on)))
+            scale, one_way = self.scale(on, size), self._one_way(on)
+            found.append(contrasts.log_marginals(scale, columns, np.transpose(sizes), one_way, barred))
         return [averaged(log) for log in np.transpose(found)] if on else found[0].tolist()
 
     def _one_way(self, on) -> list[int]:
@@ -211,12 +213,13 @@ class Table:
         key, level, scale = frozenset(on), self._unlisted(on), self.scale(on)
         if key in self._clear:
             return self._clear[key]
-        gains = self._beside(level).gains(scale, self.index.size + self.coarse.columns, self.coarse.sizes)
+        coarse, barred = self.coarse, partial(turns_back, frequency=self.coarse.members)
+        gains = self._beside(level).gains(scale, self.index.size + coarse.columns, coarse.sizes, barred)
         weight, fine = log_prior(self.coarse.members), {}
         for at in _alike(gains + weight, self.coarse.members):
             near, bank = self._about(at, level), fine_bank(self.coarse.members[at], self.phases)
             columns = self.index.size + bank.columns
-            closely = near.gains(scale, columns, bank.sizes)
+            closely = near.gains(scale, columns, bank.sizes, partial(turns_back, frequency=bank.members))
             gains[at], fine[at] = log_mean(closely), (bank, columns, closely)
         at = max(fine, key=lambda at: gains[at] + weight[at])
         bank, columns, closely = fine[at]

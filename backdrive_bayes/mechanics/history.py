@@ -13,7 +13,7 @@ from backdrive_bayes.records.reduction import FEW, Blocks
 FILM = 0.03
 """Torque, in shares of the largest, that passes at the usual rate while a film of lubricant takes on a new speed."""
 RESTING = 0.05
-"""Rate, in shares of the usual one, below which a film stays as it is."""
+"""Rate, in shares of the usual one, below which the torque rests and a film stays as it is."""
 LEAST_RANGE = 0.05
 """Range of a logarithm of rate or amplitude, and of what a law makes of it, below which it counts as one value: nothing is learnt
 of the law from it."""
@@ -28,7 +28,7 @@ class History:
     ``z0`` and ``z1`` are the torques at the ends as shares of the unit's largest torque, ``t0`` and ``t1`` the times
     [s], ``block``
     the block that a segment belongs to and ``weight`` its share of the block's time. ``surge`` is the logarithm of the loading
-    rate over the history's mean rate at the segments' ends, (2, segments), or zero where it is the same everywhere. ``state`` is
+    rate over the history's own at the segments' ends, (2, segments), or zero where it is the same everywhere. ``state`` is
     the one of :data:`backdrive_bayes.mechanics.cells.START` in which it begins. ``largest`` is the torque whose thresholds it
     has, by default its own largest.
     """
@@ -105,22 +105,39 @@ def through(time_s, torque_nm, torque_scale_nm: float) -> History:
     return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count, surge)
 
 
+def loading_rate(time_s, torque) -> float:
+    """Mean rate of a path that is straight between instants [s], without its rests where it turns, begins or ends [its unit a
+    second]: what passes there at less than RESTING of it. Zero where the torque never moves."""
+    way, spans = np.diff(torque), np.diff(time_s)
+    rests = way == 0.0
+    while not rests.all():
+        sign = np.sign(way[~rests])
+        before = np.cumsum(~rests)
+        last, following = np.r_[0.0, sign][before], np.r_[sign, 0.0][before]
+        counted = ~rests | (last == following)
+        rate = float(np.abs(way[counted]).sum() / max(spans[counted].sum(), 1e-300))
+        more = rests | (np.abs(way) < RESTING * rate * spans)
+        if np.array_equal(more, rests):
+            return rate
+        rests = more
+    return 0.0
+
+
 def _bends(time_s, z) -> np.ndarray:
     """Instants [s] at which the loading rate about them bends, none where it is the same everywhere."""
     if np.ndim(_surge(time_s, z, time_s)) == 0:
         return np.empty(0)
-    half = FILM * (time_s[-1] - time_s[0]) / np.abs(np.diff(z)).sum()
+    half = FILM / loading_rate(time_s, z)
     found = np.r_[time_s - half, time_s + half]
     return found[(found > time_s[0]) & (found < time_s[-1])]
 
 
 def _surge(time_s, z, at_s) -> np.ndarray | float:
-    """Logarithm of the loading rate about instants [s] over the mean rate of a path that is straight between ``time_s``."""
-    passed, span = np.r_[0.0, np.cumsum(np.abs(np.diff(z)))], time_s[-1] - time_s[0]
+    """Logarithm of the loading rate about instants [s] over that of a path that is straight between ``time_s``."""
+    passed, usual = np.r_[0.0, np.cumsum(np.abs(np.diff(z)))], loading_rate(time_s, z)
     # About every instant of a path within the film lies the whole of it.
-    if not (span > 0.0 and passed[-1] > FILM):
+    if not passed[-1] > FILM:
         return 0.0
-    usual = passed[-1] / span
     begin, end = (np.clip(at_s + sign * FILM / usual, time_s[0], time_s[-1]) for sign in (-1.0, 1.0))
     rate = (np.interp(end, time_s, passed) - np.interp(begin, time_s, passed)) / np.maximum(end - begin, 1e-300)
     surge = np.log(np.maximum(rate / usual, RESTING))

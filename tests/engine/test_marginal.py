@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import block_diag, null_space
 from scipy.stats import invgamma, multivariate_normal, multivariate_t
 
+from backdrive_bayes.engine.contrasts import BARRED, Contrasts, averaged
 from backdrive_bayes.engine.contrasts import SIZES as SIZES_OF_EFFECTS
-from backdrive_bayes.engine.contrasts import Contrasts, averaged
 from backdrive_bayes.engine.marginal import LOG_SCALES, Scales, Whitened, _slopes, find_scales, whiten
 
 SIZES, WEIGHTS, DOF = (30, 22), 9, 25.0
@@ -248,6 +248,14 @@ def test_further_columns_weigh_as_if_they_had_been_there_and_gains_are_exact(pro
     each = contrasts.log_marginals(base, columns, SIZES_OF_EFFECTS[:, None] * size)
     exact = averaged(each) - contrasts.log_marginal(base)
     assert contrasts.gains(base, columns[None], size[None]) == pytest.approx([exact])
+    # What is barred is told the means of its weights, given all others.
+    seen = []
+    barred = contrasts.log_marginals(base, columns, size[None], barred=lambda mean: bool(seen.append(mean)) or True)
+    assert barred == pytest.approx(contrasts.log_marginals(base, columns, size[None]) + BARRED)
+    np.testing.assert_allclose(seen[0], data.solve(np.maximum(whole, 1e-12)).mean[columns], rtol=1e-6)
+    contrasts.gains(base, columns[None], size[None], lambda mean: np.array([bool(seen.append(mean))]))
+    middle = np.flatnonzero(SIZES_OF_EFFECTS == 1.0)[0]
+    np.testing.assert_allclose(seen[1 + middle][0], seen[0], rtol=1e-6)
     linear = 0.5 * (data.noise_dof + data.samples) * (1.0 - contrasts.chi2(whole) / contrasts.chi2(base))
     assert abs(linear - exact) > 0.05 * abs(exact)
 

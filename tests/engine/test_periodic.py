@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from backdrive_bayes.engine.periodic import HARMONICS, WAVE, rises
+from backdrive_bayes.engine.periodic import HARMONICS, WAVE, rises, turns_back
 
 
 @pytest.mark.parametrize(("height", "order", "rising"), [(0.01, 1, True), (0.05, 1, False), (0.05, 4, True), (0.2, 4, False)])
@@ -17,3 +17,6 @@ def test_a_reading_that_a_wave_turns_back_does_not_rise(height, order, rising):
     weights[1, order - 1] = 0.6 * height, 0.8 * height
     slope = np.gradient(angle + height / order**2 * np.sin(2 * np.pi * frequency * order * angle + 0.3), angle)
     assert rises(SimpleNamespace(weights={WAVE: weights.ravel()}), frequency) is rising is bool(slope.min() > 0)
+    own = weights / np.arange(1, HARMONICS + 1)[:, None] ** 2
+    both = turns_back(np.stack([0.0 * own, own]).reshape(2, -1), np.array([frequency, frequency]))
+    assert both.tolist() == [False, not rising]

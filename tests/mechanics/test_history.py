@@ -8,7 +8,7 @@ from support.planted import by_hand, smooth_reducer
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.mechanics import history as module
 from backdrive_bayes.mechanics.friction import FRICTION
-from backdrive_bayes.mechanics.history import of_blocks, through
+from backdrive_bayes.mechanics.history import loading_rate, of_blocks, through
 from backdrive_bayes.records.reduction import Blocks
 
 SCALE, RATE = 0.1, 0.05
@@ -81,6 +81,20 @@ def test_samples_are_blocks_of_their_own():
     history = through([0.0, 1.0, 3.0], [0.0, 0.1, -0.1], SCALE)
     np.testing.assert_allclose(middle(history), [0.5, 0.0], atol=1e-15)
     assert history.start == 0.0 and history.blocks == 2
+
+
+def test_a_rest_where_the_torque_turns_is_no_loading():
+    """Planted fault: the mean over all of the time."""
+    time, torque = np.array([0.0, 9.0, 10.0, 13.0, 15.0, 18.0, 20.0]), np.array([0.0, 0.0, 1.0, 1.0, -1.0, -1.0 + 1e-6, 1.0])
+    assert loading_rate(time, torque) == pytest.approx(1.0)
+    assert abs(np.abs(np.diff(torque)).sum() / time[-1] - 1.0) > 0.5
+    stairs = np.array([0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 2.0])
+    assert loading_rate(np.arange(8.0), stairs) == pytest.approx(4.0 / 6.0)
+    assert loading_rate(np.arange(3.0), np.ones(3)) == 0.0
+    turned = -stairs[::-1]
+    assert loading_rate(np.arange(8.0), turned) == loading_rate(np.arange(8.0), stairs)
+    long = np.r_[-1e5, time[1:]]
+    np.testing.assert_allclose(through(long, torque, 1.0).surge[:, 1:], through(time, torque, 1.0).surge[:, 1:])
 
 
 def test_thresholds_that_follow_the_rate_are_followed_where_it_bends(monkeypatch):
