@@ -198,7 +198,10 @@ def _growth_groups(reduced, reducer, design, distortion, grown, weights, effects
         return [distortion.law(rate + history.surge, history.log_amplitude, reduced.context) for rate, history in rates]
 
     read = laws(histories(reduced, UNDISTORTED))
-    identified = [e for e in effects if np.ptp(np.concatenate([np.ravel(law[e.term]) for law in read])) > LEAST_RANGE]
+    ranges = {e: np.ptp(np.concatenate([np.ravel(law[e.term]) for law in read])) for e in effects}
+    # Without its module a class has no thresholds of that kind.
+    there = {p.name for p in reducer.parts}
+    identified = [e for e, found in ranges.items() if found > LEAST_RANGE and there.intersection(GROWING[e.part])]
     if not identified:
         return []
     part = identified[0].part

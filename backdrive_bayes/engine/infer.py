@@ -52,6 +52,8 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
     scales, mode, solution = learn_scales(linear, levels(linear, hypothesis))
     drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWERS)
     reduced, names = linear.reduced, linear.design.names
+    weights = np.split(drawn.weights, np.cumsum([g.width for g in linear.design.groups])[:-1], axis=-1)
+    unlearnt = _unlearnt(linear, drawn.log_density.shape, seed)
     return Posterior(
         unit_name=reduced.unit.name,
         data_hashes=reduced.unit.data_sha256,
@@ -61,9 +63,7 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
         effects=linear.effects,
         context=reduced.context,
         records=record_facts(reduced),
-        weights=dict(
-            zip(names, np.split(drawn.weights, np.cumsum([g.width for g in linear.design.groups])[:-1], axis=-1), strict=True)
-        ),
+        weights=dict(zip(names, weights, strict=True)) | unlearnt,
         log_scale={n: drawn.log_scale[..., i] for i, n in enumerate(names)},
         log_density=drawn.log_density,
         predicted_rad=tuple(p * reduced.angle_scale_rad for p in linear.predicted),
@@ -75,6 +75,14 @@ def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=
         hypothesis=hypothesis,
         jitter=(linear.jitter.torque * reduced.torque_scale_nm, linear.jitter.length * reduced.torque_scale_nm),
     )
+
+
+def _unlearnt(linear: Linear, shape: tuple[int, int], seed: int) -> dict[str, np.ndarray]:
+    """Draws from their priors, (chains, draws, 1) each, of what every reducer has and the records do not tell: loops of one
+    amplitude know nothing of how thresholds follow it, and at another amplitude it counts."""
+    rng, context = np.random.default_rng([seed, 5]), linear.reduced.context
+    own = (e for e in linear.effects if e.of_class and e.name not in linear.design.names)
+    return {e.name: e.present(context) * rng.standard_normal((*shape, 1)) for e in own}
 
 
 def record_facts(reduced: Reduced) -> RecordFacts:

@@ -11,7 +11,7 @@ from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, GrowthEffect
 from backdrive_bayes.mechanics.history import History, loading_rate, through
-from backdrive_bayes.mechanics.reducer import ReducerClass
+from backdrive_bayes.mechanics.reducer import BEFORE, GROWING, ReducerClass
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,12 +118,21 @@ class Posterior:
             columns = effect_columns(effect, self.reducer, history, mean, growth, turned, self.context, ends=True)
             if columns is not None:
                 found = found + self.flat[effect.name] @ columns.T
-            elif isinstance(effect, GrowthEffect):
-                term = self.distortion.law(log_rate, history.log_amplitude, self.context)[effect.term]
-                (grown,) = self.reducer.grown(history, mean, growth, effect.part, [term], ends=True)
-                away = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter)
+        law = self.distortion.law(log_rate, history.log_amplitude, self.context)
+        return sum((self._grown(part, history, law, growth, mean) for part in range(len(GROWING))), found)
+
+    def _grown(self, part: int, history, law, growth, mean):
+        """What growths of one kind of thresholds other than the mode's add, (draws, segments): what is the same along the history
+        as it is, what varies along it, and a drag before all parts, which is never negative, by the derivative."""
+        found = shift = np.zeros(())
+        for effect in (e for e in self.effects if isinstance(e, GrowthEffect) and e.part == part and e.name in self.flat):
+            away, term = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter), law[effect.term]
+            level = 0.0 if part == BEFORE else float(np.mean(term))
+            shift = shift + away * level
+            if np.any(term != level):
+                (grown,) = self.reducer.grown(history, mean, growth, part, [term - level], ends=True)
                 found = found + np.outer(away, grown)
-        return found
+        return found + self.reducer.shifted(history, mean, growth, part, shift) if np.any(shift) else found
 
     def along(self, time_s, torque_nm) -> np.ndarray:
         """Angles [rad] for a torque history, (draws, samples), zero at the first sample's neutral state."""

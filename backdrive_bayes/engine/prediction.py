@@ -15,6 +15,8 @@ from backdrive_bayes.mechanics.part import TOP
 
 MOST_NODES = 20_000
 """Samples at which the class is evaluated; between them, on one monotone run, curves are straight."""
+STRAIGHT = 1 / 16
+"""Torque, in shares of the largest, along which what creeps is straight."""
 PRELOADS = np.array([0.0, 1.0, -1.0, 1 / 3, -1 / 3, 2 / 3, -2 / 3])
 """Torques, in the largest measured one, from which a reducer of unknown history may have come, equally probable."""
 SLACK = 0.02
@@ -96,6 +98,10 @@ def _from(posterior, time, torque, rate, preload_nm):
     ramp = np.abs(np.diff(before)) / rate
     early = time[0] - np.r_[np.cumsum(ramp[::-1])[::-1], 0.0]
     scale = posterior.context.torque_scale_nm
+    # What creeps bends between nodes that lie far apart.
+    pieces = np.maximum(np.ceil(np.abs(np.diff(torque)) / (STRAIGHT * scale)), 1.0)
+    own = np.r_[0, np.cumsum(pieces)].astype(int)
+    time, torque = (np.interp(np.arange(own[-1] + 1), own, along) for along in (time, torque))
     # A record has the thresholds of its own amplitude, whatever went before it.
     history = replace(through(np.r_[early, time], np.r_[before, torque], scale), largest=float(np.abs(torque).max()) / scale)
-    return posterior.angles(history, rate)[:, -torque.size :]
+    return posterior.angles(history, rate)[:, before.size - 1 + own]

@@ -93,7 +93,7 @@ def mixed(drawn: list[tuple[Posterior, float]]) -> Posterior:
     return replace(
         first,
         weights={n: join(lambda q, n=n: q.weights[n]) for n in common},
-        log_scale={n: join(lambda q, n=n: q.log_scale[n]) for n in common},
+        log_scale={n: join(lambda q, n=n: q.log_scale[n]) for n in common if n in first.log_scale},
         log_density=join(lambda q: q.log_density),
         convergence=worst,
     )

@@ -16,6 +16,7 @@ import numpy as np
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.cells import Cells
 from backdrive_bayes.mechanics.clearance import clearance, free_play
+from backdrive_bayes.mechanics.effect import MOST_GROWTH
 from backdrive_bayes.mechanics.friction import FRICTION, flanks, friction, masing
 from backdrive_bayes.mechanics.history import History
 from backdrive_bayes.mechanics.part import TOP, Part, apart
@@ -24,6 +25,10 @@ ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95,
 EVERY = ("compliance", "elastic", *FRICTION, "clearance", "free_play")
 GROWING = (FRICTION, ("clearance",), EVERY)
 """Parts whose thresholds follow the rate and the amplitude: of friction, and drags; and those behind a drag at the shaft."""
+BEFORE = 2
+"""Number of the last of them."""
+SHIFTS = 7
+"""Growths of the draws at which responses are made, those between are interpolated: their quantiles, from least to largest."""
 UNGROWN = (0.0, 0.0, 0.0)
 """Growth where nothing grows."""
 GROWTH_STEPS = (2e-3, 2e-3, 2e-5)
@@ -74,6 +79,21 @@ class ReducerClass:
 
         here = response(0.0) if here is None else here
         return [(response(term) - here) / step for term in terms]
+
+    def shifted(self, history: History, weights, growth, part: int, shifts) -> np.ndarray:
+        """What growths of friction (0) or of drag (1) by each of ``shifts`` (draws,) more add at the segments' ends, (draws,
+        segments), with independent ``weights``: straight from response to response at quantiles of the shifts, for where a step
+        is crossed no derivative leads far."""
+        own, shifts = [p for p in self.parts if p.name in GROWING[part]], np.clip(shifts, -MOST_GROWTH, MOST_GROWTH)
+
+        def response(shift):
+            grown = tuple(g + shift * (k == part) for k, g in enumerate(growth))
+            ends = (_response(_cells(p, grown), history, p.weights(weights[p.name]), True) for p in own)
+            return sum(ends, np.zeros(history.z1.size))
+
+        nodes = np.unique(np.r_[0.0, np.quantile(shifts, np.linspace(0.0, 1.0, SHIFTS))])
+        between = np.stack([np.interp(shifts, nodes, share) for share in np.eye(nodes.size)], axis=1)
+        return between @ (np.stack([response(node) for node in nodes]) - response(0.0))
 
     def ends(self, history: History, growth=UNGROWN) -> dict[str, np.ndarray]:
         """The same at the end of every segment."""

@@ -196,8 +196,9 @@ def _rests(run, x, edges, r, more, follows):
     a, b, u, d = edges
     for factor in (least, most):
         g = factor - 1.0
-        # Without its least width the upper bound is lower and straight in the factor, so that both ends tell.
-        above, below = a + r * g + x * (u + more * g), b - r * g + x * max(d - more * g, LEAST_WIDTH * d)
+        # The upper bound is concave in the factor and the lower one convex, so that both ends tell.
+        above = a + u + (r + more) * g - (1.0 - x) * max(u + more * g, LEAST_WIDTH * u)
+        below = b - r * g + x * max(d - more * g, LEAST_WIDTH * d)
         if follows:
             above, below = factor * (a + x * u), factor * (b + x * d)
         if (x < 1.0 and high > above + drag) or (x > 0.0 and low < below - drag):
@@ -213,7 +214,9 @@ def _edges(z, factor, drag, edges, r, more, follows):
     if follows:
         return z - drag - a * factor, z + drag - b * factor, u * factor, d * factor
     g = factor - 1.0
-    return z - drag - r * g - a, z + drag + r * g - b, max(u + more * g, LEAST_WIDTH * u), max(d - more * g, LEAST_WIDTH * d)
+    wide = max(u + more * g, LEAST_WIDTH * u)
+    # Where a width is at its least, the mirror image of the first relay stays, which is the last one.
+    return z - drag - r * g - a + wide - u - more * g, z + drag + r * g - b, wide, max(d - more * g, LEAST_WIDTH * d)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -50,6 +50,13 @@ def test_a_unit_upside_down_is_the_same_unit():
         assert min(np.abs(one - other).max(), np.abs(one + other).max()) < 1e-5 * np.abs(one).max()
 
 
+@pytest.mark.parametrize("modules", [("elastic",), ("elastic", "friction"), ("geometric", "elastic")])
+def test_a_class_without_a_module_has_no_thresholds_of_it_that_grow(modules):
+    """Of records at several rates; columns of nothing were a traceback."""
+    linear = search.Search(reduce_unit(planted()), library_terms(), modules).first(Distortion())
+    assert np.isfinite(linear.log_marginal) and ("friction_rate" in linear.design.names) == ("friction" in modules)
+
+
 @pytest.fixture(scope="module")
 def clean():
     return mode()

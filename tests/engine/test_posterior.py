@@ -16,6 +16,7 @@ from backdrive_bayes.engine.infer import infer
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.indicators.draws import IndicatorDraws, core_indicators
 from backdrive_bayes.indicators.loop import cut_loops, settled_history
+from backdrive_bayes.mechanics.effects import noncongruent_loops
 from backdrive_bayes.mechanics.registry import library_terms
 from backdrive_bayes.records.record import Unit
 
@@ -121,6 +122,24 @@ def test_a_coarsened_posterior_is_wider():
     unit = planted(loops=((0.1, 0.1),))
     full, third = (ends(fitted(unit, powers=(p,))) for p in (1.0, 1.0 / 3.0))
     assert all(np.diff(third[n])[0] > 1.3 * np.diff(full[n])[0] for n in NAMES)
+
+
+def test_loops_of_one_amplitude_tell_nothing_of_how_thresholds_follow_it():
+    """Every reducer has that law: a smaller loop is as uncertain as the law is a priori, one of the same size is not. The planted
+    fault takes the mean of the law for all there is."""
+    linear = joint_mode(reduce_unit(planted(), 30), library_terms())
+    posterior, names = fitted_by(linear, ()), {e.name for e in library_terms() if e.of_class}
+    assert names and not names.intersection(linear.design.names) and names <= set(posterior.weights)
+    for name in names:
+        assert np.std(posterior.weights[name]) == pytest.approx(noncongruent_loops.USUAL, rel=0.1)
+    without = replace(posterior, weights={n: w for n, w in posterior.weights.items() if n not in names})
+
+    def spread(which, amplitude):
+        torque = np.linspace(-amplitude, amplitude, 101)
+        return np.std(cut_loops(torque, which.angles(settled_history(torque, RATE, AMPLITUDE), RATE)).width.mean(axis=1))
+
+    assert spread(posterior, 0.2 * AMPLITUDE) > 2.0 * spread(without, 0.2 * AMPLITUDE)
+    assert spread(posterior, AMPLITUDE) == pytest.approx(spread(without, AMPLITUDE), rel=0.01)
 
 
 def test_one_seed_gives_the_same_bytes():

@@ -9,6 +9,8 @@ from support.made_posterior import OFFSET, known, made_posterior
 from backdrive_bayes.engine import prediction
 from backdrive_bayes.engine.prediction import nodes, predict_angles, rate_caveat, require_range
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.mechanics.history import through
+from backdrive_bayes.mechanics.registry import LIBRARY
 
 
 def minor_loops():
@@ -30,6 +32,26 @@ def test_an_unknown_state_is_wider_until_the_first_large_torque():
     time, torque = minor_loops()
     rest, unknown = (predict_angles(made_posterior(), time, torque, s).std(axis=0) for s in ("rest", "unknown"))
     assert unknown[0] > 10 * rest[0] and unknown[-1] < 1.3 * rest[-1]
+
+
+def test_what_creeps_bends_between_points_that_lie_far_apart(monkeypatch):
+    """Only the turning points are given; the planted fault follows creep straight from one to the next."""
+    posterior = made_posterior()
+    (creep,) = LIBRARY["viscoelastic_creep"]
+    columns = creep.responses(through(np.arange(4), np.array([0.0, 0.1, -0.1, 0.1]), 0.1), None, posterior.context)[0].shape[1]
+    weights = posterior.weights | {creep.name: np.full((*posterior.shape, columns), 0.02)}
+    posterior = replace(posterior, weights=weights, effects=(*posterior.effects, creep))
+    turns = np.array([0.0, 10.0, 30.0, 50.0])
+    fine = np.linspace(0.0, 50.0, 2001)
+
+    def at_turns(time):
+        found = predict_angles(posterior, time, np.interp(time, turns, [0.0, 0.1, -0.1, 0.1]), "rest")
+        return found[:, np.searchsorted(time, turns)].mean(axis=0)
+
+    exact = at_turns(fine)
+    close = np.abs(at_turns(turns) - exact).max()
+    monkeypatch.setattr(prediction, "STRAIGHT", 10.0)
+    assert close < 0.1 * np.abs(at_turns(turns) - exact).max() and close < 1e-4 * np.ptp(exact)
 
 
 def test_what_went_before_does_not_change_thresholds(monkeypatch):

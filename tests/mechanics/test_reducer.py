@@ -149,6 +149,27 @@ def test_growth_has_its_own_derivatives(ends, moves):
         assert np.sqrt(np.mean((found - wide) ** 2)) < 0.15 * np.abs(wide).max() and np.abs(wide).max() > 0
 
 
+@pytest.mark.parametrize("part", [0, 1])
+def test_growths_of_draws_are_those_of_the_thresholds(part):
+    """Where a step is crossed the derivative, the planted fault, leads to spikes."""
+    history, growth = ramp(0.0, 1.0, -1.0, 1.0), (0.1, -0.1, 0.0)
+    rng = np.random.default_rng(1)
+    weights = {p.name: rng.standard_normal(p.cells.count if p.mixing is None else p.mixing.shape[1]) for p in REDUCER.parts}
+    shifts = 0.4 * rng.standard_normal(9)
+
+    def angle(shift):
+        columns = REDUCER.ends(history, tuple(g + shift * (k == part) for k, g in enumerate(growth)))
+        return sum(columns[n] @ weights[n] for n in columns)
+
+    exact = np.stack([angle(shift) for shift in shifts]) - angle(0.0)
+    (grown,) = REDUCER.grown(history, weights, growth, part, [1.0], ends=True)
+    found = REDUCER.shifted(history, weights, growth, part, shifts)
+    assert np.abs(found - exact).max() < 0.3 * np.abs(np.outer(shifts, grown) - exact).max()
+    few = REDUCER.shifted(history, weights, growth, part, shifts[:3])
+    np.testing.assert_allclose(few, exact[:3], atol=1e-9 * np.abs(exact).max())
+    assert not REDUCER.shifted(history, weights, growth, part, np.zeros(2)).any()
+
+
 def test_denser_thresholds_leave_the_prior_of_the_loop_as_it_is():
     """Width of the largest loop at zero torque that friction has a priori; with weights as wide as on the first grid more
     thresholds would make it larger (planted fault)."""
@@ -200,11 +221,15 @@ def test_a_flank_that_slips_back_beyond_zero_does_so_in_proportion_to_its_load()
 
 
 @pytest.mark.parametrize("growth", [0.3, -0.3])
-def test_growth_of_a_flank_along_a_history_is_that_of_all_its_thresholds(growth):
-    cells, history = flank(0.48)[0], ramp(0.0, 1.0, -1.0, 0.4, -0.4, 1.0)
+@pytest.mark.parametrize("ratio", [0.48, 0.015, -0.02])
+def test_growth_of_a_flank_along_a_history_is_that_of_all_its_thresholds(growth, ratio):
+    cells, history = flank(ratio)[0], ramp(0.0, 1.0, -1.0, 0.4, -0.4, 1.0)
     along = cells.grown(np.full((2, history.weight.size), growth))
     np.testing.assert_allclose(along.ends(history), cells.grown(growth).ends(history), atol=1e-12)
     np.testing.assert_allclose(along.means(history), cells.grown(growth).means(history), atol=1e-12)
+    varying = cells.grown(growth * np.stack([np.linspace(-1.0, 1.0, history.weight.size)] * 2))
+    mirrored = replace(history, z0=-history.z0, z1=-history.z1)
+    np.testing.assert_allclose(varying.ends(mirrored), -varying.ends(history), atol=1e-12)
 
 
 def test_flanks_that_differ_are_even_in_the_torque():
