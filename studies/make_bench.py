@@ -88,13 +88,13 @@ def entry(bench, plan) -> dict:
     """What the key holds of a unit, in SI units."""
     truth, records = bench.truth, list(zip(bench.unit.records, bench.truth.records, strict=True))
     by_amplitude = sorted(records, key=lambda pair: pair[0].amplitude_nm)
-    held = truth.held
+    held, planted = truth.held, [p for p in truth.planted if p.answer in truth.answer]
     return rounded(
         {
-            "effects": [p.name if p.name == p.answer else f"x_{p.name}" for p in truth.planted],
-            "size": max((p.severity for p in truth.planted), default=1),
-            "heights": [p.height for p in truth.planted],
-            "limited": any(p.limited for p in truth.planted),
+            "effects": [p.name if p.name == p.answer else f"x_{p.name}" for p in planted],
+            "size": max((p.severity for p in planted), default=1),
+            "heights": [p.height for p in planted],
+            "limited": any(p.limited for p in planted),
             "kind": truth.kind,
             "bench": truth.bench,
             "tr": bench.unit.rated_torque_nm,

@@ -33,8 +33,8 @@ class HeldRecord:
 def own_loop(mechanics: Mechanics, reducer, effects, where: Circumstances, amplitude_nm: float) -> dict[str, float]:
     """Indicators [rad, J, 1] of the loop of this amplitude [N·m] and the record's rate.
 
-    Only effects of the reducer itself act. Definitions as in the contract: width at zero torque, lost motion at ±0.03 T_r, half
-    the peak-to-peak angle, enclosed area, signed work of loading, and area over work.
+    Only effects of the reducer itself act. Definitions as in the contract: width at zero torque, lost motion at ±0.03 T_r (NaN
+    where the loop does not reach that), half the peak-to-peak angle, enclosed area, signed work of loading, and area over work.
     """
     rate = where.path.rate_nm_per_s
     turns = amplitude_nm * np.array([0.0, 1, -1, 1, -1, 1])
@@ -67,8 +67,9 @@ def _indicators(torque, rising, falling, small_nm):
     area = float(np.sum(0.5 * (width[1:] + width[:-1]) * np.diff(torque)))
     upper, lower = torque >= 0, torque <= 0
     work = _work(torque[upper], rising[upper]) - _work(torque[lower], falling[lower])
+    lost = float(np.diff(np.interp([-small_nm, small_nm], torque, middle))[0])
     return {
-        "lost_motion_rad": float(np.diff(np.interp([-small_nm, small_nm], torque, middle))[0]),
+        "lost_motion_rad": lost if small_nm <= torque[-1] else float("nan"),
         "zero_torque_width_rad": float(np.interp(0.0, torque, width)),
         "peak_angle_rad": float(0.5 * (rising[-1] - rising[0])),
         "loop_area_J": area,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.bench import registry
 from backdrive_bayes.bench.benches import DEFAULT_BENCH, find_bench
@@ -16,7 +17,7 @@ from backdrive_bayes.bench.plan import DEFAULT_PLAN, Plan, draw_past, make_path
 from backdrive_bayes.bench.protocol import BenchEffect, Circumstances, Mechanics
 from backdrive_bayes.bench.rig import Rig, draw_rig, rig_angle
 from backdrive_bayes.bench.severity import FULL, Yardstick, make_yardstick, scale_to
-from backdrive_bayes.bench.soil import draw_soil
+from backdrive_bayes.bench.soil import HEIGHT, draw_soil
 from backdrive_bayes.bench.truth import BenchUnit, PlantedEffect, RecordTruth, Truth
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.record import Record, Unit
@@ -39,13 +40,15 @@ class _Test:
         return self.mechanics.angle(self.reducer, effects, where, time_s)
 
 
+@threadpool_limits.wrap(limits=1)  # sums in another order would change last bits
 def draw_unit(
     rng, effects=None, *, bench=DEFAULT_BENCH, plan: Plan = DEFAULT_PLAN, kind=None, soil=1.0, reserved=False, name="bench"
 ) -> BenchUnit:
     """A unit at random with ``effects``, a mapping of names to severities.
 
     Names are those of the bench (registry.py); 'unknown' takes an unlisted effect at random (a ``reserved`` one if so asked),
-    'none' adds nothing. ``kind`` is one of the bench's kinds or None; ``soil`` 0 gives a perfectly clean bench. Raises BadInput.
+    'none' adds nothing; one that stands out no further than a trace is planted and not answered. ``kind`` is one of the bench's
+    kinds or None; ``soil`` 0 gives a perfectly clean bench. Raises BadInput.
     """
     mechanics = find_bench(bench)
     chosen = registry.choose_effects(rng, mechanics, effects or {}, reserved)
@@ -62,7 +65,8 @@ def draw_unit(
     truths = tuple(_true_record(rng, test, where, z) for where, z in zip(records, remainder, strict=True))
     measured = tuple(_measure(rng, test, truth, where) for truth, where in zip(truths, records, strict=True))
     held = held_record(mechanics, reducer, test.acting, strong, _fourth_rate(records), records[-1].start_s)
-    answer = tuple(dict.fromkeys(p.answer for p in planted))
+    # What a plan does not show (another gain in each of one record) is not there.
+    answer = tuple(dict.fromkeys(p.answer for p in planted if p.height > HEIGHT[1]))
     truth = Truth(bench, kind, answer, planted, reducer, noise, chain, rig, traces, truths, remainder, held)
     return BenchUnit(Unit(name, reducer.rated_torque_nm, measured, reducer.reduction_ratio), truth)
 

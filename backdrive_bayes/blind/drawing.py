@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
 from pathlib import Path
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.bench.unit import draw_unit
 from backdrive_bayes.bench.writing import write_unit
@@ -27,27 +25,18 @@ def assignments(request: Request) -> list[dict[str, float]]:
 
 
 def draw_and_write(request: Request, index: int, effects: dict[str, float], units: Path) -> dict:
-    """Write one unit into its folder below ``units`` and return its entry of the key; equal arguments give equal bytes.
-
-    A folder that is there with the same bytes is left alone.
-    """
+    """Write one unit into its folder below ``units`` and return its entry of the key; equal arguments give equal bytes."""
     rng = np.random.default_rng([request.seed, 1, index])
     plan, name = draw_plan(request, rng), unit_name(index)
-    with threadpool_limits(1):  # sums in another order would change last bits
-        bench = draw_unit(rng, effects, plan=plan, soil=request.dirt, reserved=request.reserved, name=name)
-    part = Path(units) / f".{name}.{secrets.token_hex(4)}.part"
-    part.mkdir()
-    try:
-        write_unit(bench, part)
-        entry = key_entry(bench, folder_digest(part))
-        _put(part, Path(units) / name, entry["folder_sha256"])
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-    return entry
+    bench = draw_unit(rng, effects, plan=plan, soil=request.dirt, reserved=request.reserved, name=name)
+    folder = Path(units) / name
+    folder.mkdir()
+    write_unit(bench, folder)
+    return key_entry(bench, folder_digest(folder))
 
 
-def _put(part, folder, sha256):
-    if folder.exists() and folder_digest(folder) == sha256:
-        return
-    shutil.rmtree(folder, ignore_errors=True)
-    os.rename(part, folder)
+def put(drawn: Path, folder: Path, sha256: str) -> None:
+    """Move a drawn unit to its folder; one that is there with the same bytes is left alone."""
+    if not (folder.exists() and folder_digest(folder) == sha256):
+        shutil.rmtree(folder, ignore_errors=True)
+        os.rename(drawn, folder)

@@ -6,6 +6,8 @@ import hashlib
 import json
 from pathlib import Path
 
+import numpy as np
+
 from backdrive_bayes.bench.registry import NONE
 from backdrive_bayes.bench.truth import BenchUnit
 from backdrive_bayes.blind.request import Request
@@ -32,11 +34,13 @@ def key_entry(bench: BenchUnit, folder_sha256: str) -> dict:
         "planted": [
             {"name": p.name, "severity": p.severity, "height": rounded(p.height), "limited": bool(p.limited)} for p in planted
         ],
-        "severity": max((p.severity for p in planted), default=None),
+        "severity": max((p.severity for p in planted if p.answer in bench.truth.answer), default=None),
         "height": max((rounded(p.height) for p in planted), default=0.0),
         "limited": any(bool(p.limited) for p in planted),
         "where": {name: true_map(bench, f"{name}_rad") for name in ("remainder", "effect")},
-        "indicators": [{"record": r.name, **{k: rounded(v) for k, v in t.indicators.items()}} for r, t in named],
+        "indicators": [
+            {"record": r.name, **{k: rounded(v) for k, v in t.indicators.items() if np.isfinite(v)}} for r, t in named
+        ],
     }
 
 

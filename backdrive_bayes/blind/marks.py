@@ -27,7 +27,7 @@ class Mark:
 def _at(severity):
     def find(scores):
         rows = [row for row in scores["top_1"]["by_severity"] if row["severity"] == severity]
-        return rows[0]["listed"]["share"] if rows else None
+        return rows[0]["listed_reached"]["share"] if rows else None
 
     return find
 
@@ -41,7 +41,7 @@ MARKS = (
     Mark("false alarms: anything named on none", lambda s: s["false_alarms"]["named"]["share"], most=0.05),
     Mark("unlisted effects called unknown", lambda s: s["abstention"]["unknown"]["share"], least=0.8),
     Mark("removed effects called unknown", lambda s: s["removed"]["unknown"]["share"], least=0.8),
-    Mark("mean overlap of where", lambda s: s["where"]["remainder"]["mean"], least=0.6),
+    Mark("mean overlap of where", lambda s: s["where"]["remainder"]["with_zeros"]["mean"], least=0.6),
     Mark("median difference to the oracle's closed fraction", lambda s: s["closed"]["difference"]["median"], most=0.1),
 )
 

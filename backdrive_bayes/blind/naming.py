@@ -83,10 +83,11 @@ def _sets(cases):
 
 
 def false_alarms(cases: list[Case]) -> dict:
-    """On units with nothing missing: anything named, a listed effect named, a gap believed in; the mean probability of none."""
-    own = [c for c in cases if c.klass == NONE]
+    """On answered units with nothing missing: anything named, a listed effect named, a gap believed in; the mean probability of
+    none."""
+    own = [c for c in cases if c.klass == NONE and c.answer.label is not None]
     return {
-        "named": share(c.answer.label not in (None, NONE) for c in own),
+        "named": share(c.answer.label != NONE for c in own),
         "effect_named": share(c.names_effect for c in own),
         "gap": share((c.answer.gap or 0.0) > 0.5 for c in own),
         "probability_of_none": mean_of(c.answer.probabilities.get(NONE, 0.0) for c in own if c.answer.probabilities),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import asdict, dataclass
 
 from backdrive_bayes.bench.plan import DEFAULT_PLAN, Plan, make_plan, random_plan
@@ -62,8 +63,8 @@ def assign(request: Request, rng) -> list[dict[str, float]]:
 
     Classes and severities are dealt evenly, so that no class is left to chance.
     """
-    hands, counts = _hands(request, rng), _counts(request)
-    dealt = [effects for kind, count in counts.items() for effects in _deal(hands[kind], count, rng)]
+    names, counts = _names(request), _counts(request)
+    dealt = [effects for kind, count in counts.items() for effects in _deal(names[kind], request.severities, count, rng)]
     return [dealt[i] for i in rng.permutation(len(dealt))]
 
 
@@ -86,22 +87,15 @@ def _counts(request):
     return counts
 
 
-def _hands(request, rng):
-    """Every combination of class and severity, by kind."""
-    singles, levels = request._singles() or (), request.severities
-    pool = singles or LISTED
-    pairs = [tuple(sorted((a, b))) for i, a in enumerate(pool) for b in pool[i + 1 :]]
-    pairs = [pairs[i] for i in rng.permutation(len(pairs))]
-    return {
-        NONE: [{}],
-        UNKNOWN: [{UNKNOWN: s} for s in levels],
-        PAIR: [dict.fromkeys(pair, levels[i % len(levels)]) for i, pair in enumerate(pairs)],
-        "single": [{name: s} for name in singles for s in levels],
-    }
+def _names(request) -> dict[str, list[tuple[str, ...]]]:
+    """Effects of the units of each kind."""
+    singles = request._singles()
+    pairs = itertools.combinations(sorted(singles or LISTED), 2)
+    return {NONE: [()], UNKNOWN: [(UNKNOWN,)], PAIR: list(pairs), "single": [(name,) for name in singles]}
 
 
-def _deal(hand, count, rng):
-    dealt = []
-    while len(dealt) < count:
-        dealt += [hand[i] for i in rng.permutation(len(hand))]
-    return dealt[:count]
+def _deal(names, levels, count, rng) -> list[dict[str, float]]:
+    """Names round by round, in one order at random; from one to the next, and from round to round, the severity is another."""
+    order, levels = rng.permutation(len(names)), [levels[i] for i in rng.permutation(len(levels))]
+    turns = (divmod(k, len(names)) for k in range(count))
+    return [dict.fromkeys(names[order[at]], levels[(turn + at) % len(levels)]) for turn, at in turns]

@@ -10,7 +10,7 @@ from backdrive_bayes.bench.registry import EFFECTS
 from backdrive_bayes.blind.key import folder_digest
 from backdrive_bayes.errors import BadInput
 
-HASH, KEY, UNITS, ANSWERS = "key.sha256", Path("key") / "key.json", "units", "answers"
+HASH, KEY, UNITS, ANSWERS, DRAWING = "key.sha256", Path("key") / "key.json", "units", "answers", ".drawing"
 _TELLING = re.compile("|".join((*EFFECTS, *find_bench(DEFAULT_BENCH).unlisted, "truth", "severity", "planted")), re.IGNORECASE)
 _UNIT_FILES = re.compile(r"unit\.toml|\d+-rate-[^/]*\.csv\.gz")
 
@@ -58,6 +58,13 @@ def find_leaks(out: Path) -> list[str]:
         elif path.suffix == ".toml" and (word := _TELLING.search(path.read_text(encoding="utf-8"))):
             found.append(f"{place} says '{word.group()}'")
     return found
+
+
+def refuse_others(out: Path, names) -> None:
+    """Raise BadInput where the units' folder holds another one than those of these names."""
+    others = sorted({p.name for p in (Path(out) / UNITS).iterdir()} - set(names))
+    if others:
+        raise BadInput(Path(out) / UNITS, "the units of this check alone", f"{others[0]} beside them")
 
 
 def refuse_changed(out: Path, entries) -> None:

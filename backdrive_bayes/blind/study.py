@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from backdrive_bayes.blind import seal
 from backdrive_bayes.blind.answers import ANSWER_SCHEMA, read_answer
-from backdrive_bayes.blind.drawing import assignments, draw_and_write, unit_name
+from backdrive_bayes.blind.drawing import assignments, draw_and_write, put, unit_name
 from backdrive_bayes.blind.key import digest, key_bytes, read_key
 from backdrive_bayes.blind.request import LISTED, Request
 from backdrive_bayes.blind.scoring import score
 from backdrive_bayes.blind.workers import run_all
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.mechanics.registry import OPERATOR_PROPERTIES
 from backdrive_bayes.results import BLIND
 
 ROUNDS = ("blind", "oracle", "removed")
@@ -49,8 +51,8 @@ def run_study(study: Study) -> dict:
     key = json.loads(data)
     for kind in ROUNDS:
         _answer(study, kind, _calls(study, kind, key["units"]), opened)
+    seal.refuse_changed(study.out, key["units"])
     if not opened:
-        seal.refuse_changed(study.out, key["units"])
         (study.out / seal.KEY).parent.mkdir(exist_ok=True)
         (study.out / seal.KEY).write_bytes(data)
     key = read_key((study.out / seal.KEY).read_bytes(), seal.published(study.out))
@@ -61,12 +63,13 @@ def run_study(study: Study) -> dict:
 
 def _sealed_key(study):
     """Draw all units and publish the hash of their key, which stays in this process's memory."""
-    # What is refused is refused before hours of drawing.
+    # What is refused is refused before hours of drawing; what a killed process left of it is taken away.
+    drawing, units = study.out / seal.DRAWING, study.out / seal.UNITS
+    shutil.rmtree(drawing, ignore_errors=True)
     seal.refuse_early_answers(study.out)
     seal.refuse_leaks(study.out)
-    units = study.out / seal.UNITS
-    units.mkdir(parents=True, exist_ok=True)
-    calls = {unit_name(i): (study.request, i, effects, units) for i, effects in enumerate(assignments(study.request))}
+    drawing.mkdir(parents=True)
+    calls = {unit_name(i): (study.request, i, effects, drawing) for i, effects in enumerate(assignments(study.request))}
     entries = {}
 
     def drawn(name, outcome):
@@ -75,10 +78,17 @@ def _sealed_key(study):
         entries[name] = outcome.value
         study.note(f"drawn {len(entries)} of {len(calls)} units", len(entries) / len(calls))
 
-    run_all(draw_and_write, calls, study.workers, drawn)
-    data = key_bytes(study.request, [entries[name] for name in calls])
-    seal.publish(study.out, digest(data))
+    try:
+        run_all(draw_and_write, calls, study.workers, drawn)
+        data = key_bytes(study.request, [entries[name] for name in calls])
+        seal.publish(study.out, digest(data))
+        units.mkdir(exist_ok=True)
+        for name in calls:
+            put(drawing / name, units / name, entries[name]["folder_sha256"])
+    finally:
+        shutil.rmtree(drawing, ignore_errors=True)
     seal.refuse_leaks(study.out)
+    seal.refuse_others(study.out, calls)
     return data
 
 
@@ -93,7 +103,9 @@ def _opened_key(study):
 def _calls(study, kind, entries):
     """Folder and library of every diagnosis of one round."""
     named = [entry for entry in entries if entry["effects"] and set(entry["effects"]) <= set(LISTED)]
-    chosen = {"blind": entries, "oracle": named[: study.oracle], "removed": named[: study.removed]}[kind]
+    # What the class holds with or without its name leaves nothing unknown behind.
+    outside = [entry for entry in named if not set(entry["effects"]).intersection(OPERATOR_PROPERTIES)]
+    chosen = {"blind": entries, "oracle": named[: study.oracle], "removed": outside[: study.removed]}[kind]
     library = {
         "blind": lambda true: None,
         "oracle": tuple,

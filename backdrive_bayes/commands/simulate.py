@@ -52,19 +52,24 @@ def run(args) -> int:
     """Write a unit folder, and the truth where asked."""
     import numpy as np
 
+    from backdrive_bayes.bench.severity import FULL
     from backdrive_bayes.bench.unit import draw_unit
     from backdrive_bayes.bench.writing import truth_json, write_unit
 
     plan, out = _plan(args), args.out or Path("bench-unit")
     _refuse_inside(args.truth, out)
+    if args.truth:
+        args.truth.parent.mkdir(parents=True, exist_ok=True)
     soil = _numbers("--soil", args.soil, 0.0, 10.0, one=True)[0]
     rng, name = np.random.default_rng(args.seed), f"bench-unit-{args.seed}"
     bench = draw_unit(rng, _effects(args.effect), bench=args.bench, plan=plan, kind=args.kind, soil=soil, name=name)
     with write_folder(out) as folder:
         write_unit(bench, folder)
     if args.truth:
-        args.truth.parent.mkdir(parents=True, exist_ok=True)
         write_json(args.truth, truth_json(bench))
+    for planted in (p for p in bench.truth.planted if p.limited):
+        wanted = planted.severity * FULL[0]
+        say(f"{planted.name} stands out by {planted.height:.2g} noise sds here, of {wanted:.2g} or more that were asked for")
     say(f"written to {out}: {len(plan.loops)} records, rated torque {bench.unit.rated_torque_nm:.4g} N·m")
     return 0
 

@@ -33,6 +33,16 @@ def test_no_engine_is_loaded_before_it_is_asked_for():
     assert "mujoco" not in sys.modules or "backdrive_bayes.bench.engine" in sys.modules
 
 
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_an_effect_is_of_the_reducer_on_every_bench_or_on_none(effect):
+    """Slip was a fault of the channel on two benches, and part of the loop on two."""
+    found = set()
+    for name in BENCHES:
+        mechanics, rng = find_bench(name), np.random.default_rng(2)
+        found.add(mechanics.effects[effect](rng, mechanics.draw_reducer(rng, mechanics.kinds[0], ())).of_reducer)
+    assert len(found) == 1
+
+
 @pytest.mark.parametrize("name", BENCHES)
 def test_a_bench_has_every_effect_and_makes_units(name):
     mechanics = find_bench(name)

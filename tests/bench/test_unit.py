@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from backdrive_bayes.bench import severity as ruler
 from backdrive_bayes.bench.channel_noise import draw_noise
@@ -23,7 +24,7 @@ from backdrive_bayes.records.unit_folder import read_unit
 
 QUICK = make_plan((0.5, 5.0), sampling_hz=500.0)
 BENCH = Path(__file__).resolve().parents[2] / "backdrive_bayes" / "bench"
-ALLOWED = {*sys.stdlib_module_names, "numpy", "scipy", "numba", "mujoco"}
+ALLOWED = {*sys.stdlib_module_names, "numpy", "scipy", "numba", "mujoco", "threadpoolctl"}
 OWN = ("backdrive_bayes.bench", "backdrive_bayes.records.record", "backdrive_bayes.errors")
 
 
@@ -62,6 +63,27 @@ def test_the_same_seed_gives_the_same_unit():
     for a, b, c in zip(one.unit.records, two.unit.records, other.unit.records, strict=True):
         np.testing.assert_array_equal(a.angle_rad, b.angle_rad)
         assert not np.array_equal(a.angle_rad, c.angle_rad)
+
+
+def test_threads_do_not_change_a_unit():
+    """Last bits of the traces' strengths were those of sums in another order."""
+    few, many = [], []
+    for threads, found in ((1, few), (4, many)):
+        with threadpool_limits(threads):
+            found += [truth_json(unit({"sensor_lag": 1}, seed)) for seed in range(4)]
+    assert few == many
+
+
+def test_what_a_plan_does_not_show_is_not_there():
+    """Another gain in each record, of one record; what is planted and seen is answered."""
+    one, two = make_plan((1.0,), sampling_hz=200.0), make_plan((1.0, 5.0), sampling_hz=200.0)
+    alone, both = (unit({"angle_scale": 1}, seed=1, plan=plan, bench="ode") for plan in (one, two))
+    assert alone.truth.answer == () and alone.truth.planted[0].limited and both.truth.answer == ("unknown",)
+
+
+def test_a_loop_that_does_not_reach_its_torque_has_no_lost_motion():
+    small, full = (unit(plan=make_plan((1.0,), (a,), sampling_hz=400.0)).truth.records[0].indicators for a in (0.02, 0.2))
+    assert np.isnan(small["lost_motion_rad"]) and full["lost_motion_rad"] > 0
 
 
 @pytest.mark.parametrize("name", [*MECHANICS.effects, *MECHANICS.unlisted])

@@ -8,7 +8,7 @@ import pytest
 from backdrive_bayes.bench.plan import make_plan
 from backdrive_bayes.bench.registry import MEMBERS
 from backdrive_bayes.bench.unit import draw_unit
-from backdrive_bayes.blind.drawing import assignments, draw_and_write
+from backdrive_bayes.blind.drawing import assignments, draw_and_write, put
 from backdrive_bayes.blind.key import folder_digest
 from backdrive_bayes.blind.request import CLASSES, LISTED, Request
 from backdrive_bayes.blind.where import BRANCHES, branch_index, overlap, true_map
@@ -26,6 +26,17 @@ def test_every_class_and_severity_is_dealt_evenly_and_in_random_order():
     assert len(cells) == 4 * len(LISTED) and set(cells.values()) == {6}
     assert not any(name in MEMBERS for e in effects for name in e)
     assert effects == assignments(Request(400)) != assignments(Request(400, seed=1))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_few_units_are_dealt_evenly_too(seed):
+    """Of the cards of every class and severity, the fault that was there, some class had none."""
+    effects = assignments(Request(40, seed=seed))
+    singles = Counter(name for e in effects if len(e) == 1 for name in e if name in LISTED)
+    assert set(singles) == set(LISTED) and max(singles.values()) - min(singles.values()) <= 1
+    for kind in (lambda e: len(e) == 1 and "unknown" not in e, lambda e: len(e) == 2, lambda e: "unknown" in e):
+        severities = Counter(max(e.values()) for e in effects if kind(e))
+        assert max(severities.values()) - min(severities.get(s, 0) for s in Request(1).severities) <= 2
 
 
 def test_fewer_classes_leave_their_share_to_the_others():
@@ -67,8 +78,11 @@ def test_the_same_request_gives_the_same_bytes_and_truth(tmp_path):
     assert first["label"] == "sensor_lag" and first["severity"] == 0.4 and first["height"] > 0
     assert sorted(first["where"]) == ["effect", "remainder"] and len(first["indicators"]) == 2
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["unit-0001"]
-    other = draw_and_write(request, 0, {"sensor_lag": 1.0}, tmp_path / "a")
-    assert other["folder_sha256"] == folder_digest(tmp_path / "a" / "unit-0001") != first["folder_sha256"]
+    (tmp_path / "c").mkdir()
+    other = draw_and_write(request, 0, {"sensor_lag": 1.0}, tmp_path / "c")
+    assert other["folder_sha256"] == folder_digest(tmp_path / "c" / "unit-0001") != first["folder_sha256"]
+    put(tmp_path / "c" / "unit-0001", tmp_path / "a" / "unit-0001", other["folder_sha256"])
+    assert folder_digest(tmp_path / "a" / "unit-0001") == other["folder_sha256"]
 
 
 def test_branches_of_one_cycle_follow_each_other():

@@ -178,8 +178,22 @@ def test_a_diagnoser_that_always_alarms_or_never_abstains_is_shown():
 
 def test_effects_short_of_their_severity_are_shown_apart():
     key = {"units": [entry(1, "sensor_lag"), entry(2, "sensor_lag", limited=True)]}
-    row = score(key, {"unit-0001": says("sensor_lag"), "unit-0002": says("none")})["top_1"]["by_severity"][0]
+    found = score(key, {"unit-0001": says("sensor_lag"), "unit-0002": says("none")})
+    row = found["top_1"]["by_severity"][0]
     assert row["listed"]["share"] == 0.5 and row["listed_reached"]["share"] == 1.0
+    assert [m["found"] for m in found["marks"] if "severity 1" in m["mark"]] == [1.0]
+
+
+def test_no_answer_is_in_nobodys_favour():
+    """The planted fault counts what failed as no alarm, and takes the overlap of the maps that there are."""
+    key = make_key(["none"] * 10 + ["sensor_lag"] * 10)
+    answers = {f"unit-{i:04d}": Answer(None, "no") for i in range(1, 21)}
+    found = score(key, answers)
+    assert verdicts(found)["false alarms: anything named on none"] is None
+    one = answers | {"unit-0001": says("sensor_lag"), "unit-0011": says("sensor_lag", cells=[cell(1.0)])}
+    found = score(key, one)
+    assert found["false_alarms"]["named"]["share"] == 1.0 and found["false_alarms"]["named"]["of"] == 1
+    assert verdicts(found)["mean overlap of where"] is False
 
 
 @pytest.mark.parametrize(

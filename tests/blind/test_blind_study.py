@@ -2,13 +2,15 @@
 
 import hashlib
 import json
+import shutil
 
 import pytest
 from invented import look_around, never, stumble
 
+from backdrive_bayes.blind.key import folder_digest
 from backdrive_bayes.blind.request import Request
 from backdrive_bayes.blind.seal import find_leaks
-from backdrive_bayes.blind.study import Study, run_study
+from backdrive_bayes.blind.study import Study, _calls, run_study
 from backdrive_bayes.commands.output import write_json
 from backdrive_bayes.errors import BadInput
 
@@ -53,6 +55,41 @@ def test_once_the_key_is_open_no_answer_is_added(finished):
         run_study(study(out, never, oracle=2))
     with pytest.raises(BadInput, match="take a new OUT"):
         run_study(Study(Request(4, plan="quick"), out, never, write_json))
+
+
+def test_a_refused_check_leaves_another_one_as_it_is(finished, tmp_path):
+    """Its units were drawn over those of the first."""
+    out, _ = finished
+    shutil.copytree(out, tmp_path / "out", ignore=shutil.ignore_patterns("key", "answers"))
+    before = {p.name: folder_digest(p) for p in sorted((tmp_path / "out" / "units").iterdir())}
+    for other in (Request(6, plan="quick", seed=3), Request(2, plan="quick", seed=9)):
+        with pytest.raises(BadInput, match="take a new OUT"):
+            run_study(Study(other, tmp_path / "out", never, write_json))
+        assert {p.name: folder_digest(p) for p in sorted((tmp_path / "out" / "units").iterdir())} == before
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["key.sha256", "units"]
+    shutil.copytree(out / "units" / "unit-0001", tmp_path / "out" / "units" / "unit-0009")
+    with pytest.raises(BadInput, match="unit-0009 beside them"):
+        run_study(study(tmp_path / "out", never))
+
+
+def test_units_that_were_changed_are_not_scored(finished, tmp_path):
+    """Also after the key was opened."""
+    out, result = finished
+    shutil.copytree(out, tmp_path / "out")
+    assert run_study(study(tmp_path / "out", never, oracle=1)) == result
+    path = next((tmp_path / "out" / "units" / "unit-0002").glob("*.csv.gz"))
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(BadInput, match="the files that were drawn"):
+        run_study(study(tmp_path / "out", never, oracle=1))
+
+
+def test_what_the_class_holds_is_not_removed(tmp_path):
+    """A second clearance without its name is no gap: the answer is none, not unknown."""
+    named = ("interface_slip", "second_backlash", "sensor_lag", "torque_offset")
+    units = [{"unit": f"unit-{i}", "effects": [name]} for i, name in enumerate(named)]
+    found = _calls(study(tmp_path, never, removed=9, oracle=9), "removed", units)
+    assert list(found) == ["unit-2", "unit-3"] and "sensor_lag" not in found["unit-2"][1]
+    assert len(_calls(study(tmp_path, never, oracle=9), "oracle", units)) == 4
 
 
 def test_a_changed_key_is_noticed(finished, tmp_path):

@@ -39,6 +39,19 @@ def test_the_truth_goes_only_where_asked(tmp_path):
     assert json.loads(truth.read_text())["answer"] == ["encoder_error"]
 
 
+def test_what_falls_short_of_its_severity_is_told(tmp_path, capsys):
+    assert run("--effect", "encoder_error=10", "--seed", "1", "-o", tmp_path / "unit") == 0
+    assert "encoder_error stands out by" in capsys.readouterr().out
+    assert run("--effect", "sensor_lag=1", "--seed", "3", "-o", tmp_path / "unit") == 0
+    assert "stands out" not in capsys.readouterr().out
+
+
+def test_a_truth_that_cannot_be_written_is_refused_first(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert run("-o", tmp_path / "unit", "--truth", tmp_path / "file" / "truth.json") == 2
+    assert not (tmp_path / "unit").exists() and len(capsys.readouterr().err.splitlines()) == 1
+
+
 def test_another_bench_is_another_reducer(tmp_path):
     names = {}
     for bench in ("sliders", "ode"):

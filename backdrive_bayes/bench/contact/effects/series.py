@@ -65,7 +65,6 @@ class InterfaceSlip(ContactEffect):
     rest: float
 
     guess = 0.02
-    of_reducer = False
 
     def deflect(self, test, run):
         """Slip, elastic turn of the gripping clamp left out."""

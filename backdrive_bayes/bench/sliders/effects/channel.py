@@ -55,7 +55,11 @@ class ThermalDrift(Effect):
         if self.variant == "warm_up":
             return -np.expm1(-np.maximum(time_s, 0.0) / self.scale_s)
         if self.variant == "walk":
-            return PchipInterpolator(np.linspace(-10.0, SESSION_S, len(self.walk)), self.walk)(np.clip(time_s, -10, SESSION_S))
+            span = SESSION_S + 10.0
+            # A longer session walks the same way back, and on.
+            back = SESSION_S - np.abs((time_s + 10.0) % (2.0 * span) - span)
+            folded = np.where(time_s > SESSION_S, back, np.maximum(time_s, -10.0))
+            return PchipInterpolator(np.linspace(-10.0, SESSION_S, len(self.walk)), self.walk)(folded)
         if self.variant == "air_conditioning":
             return np.sin(2 * np.pi * time_s / self.scale_s)
         return time_s / self.scale_s

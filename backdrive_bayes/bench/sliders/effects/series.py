@@ -48,8 +48,6 @@ class InterfaceSlip(Effect):
     law: str
     springs_back: bool
 
-    of_reducer = False
-
     def deflect(self, run, torque_nm, transmitted_nm, angle_rad):
         """Slip [rad]."""
         patches = self.threshold + self.patches_spread * np.linspace(-1, 1, 9)

@@ -54,7 +54,8 @@ class BistableMount(Effect):
 
     def read(self, run, angle_rad):
         """Angle with flips [rad]."""
-        side = np.searchsorted(self.flips, run.bench_time_s) % 2 - 0.5
+        # A longer session flips as it did before.
+        side = np.searchsorted(self.flips, np.asarray(run.bench_time_s) % self.flips[-1]) % 2 - 0.5
         return angle_rad + self.strength * run.reducer.angle_rad * side
 
 
