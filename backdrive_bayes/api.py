@@ -12,9 +12,9 @@ from backdrive_bayes.commands.output import write_file, write_folder, write_json
 from backdrive_bayes.commands.results import (
     FitOptions,
     diagnose_unit,
-    draw_figures,
     fit_unit,
     is_result,
+    keep_decision,
     keep_fit,
     refuse_company,
     retire,
@@ -276,9 +276,7 @@ def _evidence(fitted, k: float = FitOptions.k, examined: bool = False) -> Eviden
 
 def _save(result, name, folder, figures):
     with write_folder(folder) as room:
-        write_json(room / name, result)
-        if figures:
-            draw_figures(name, room)
+        keep_decision(result, name, Path(folder), room, figures)
     return Path(folder)
 
 

@@ -8,6 +8,8 @@ ARCMIN_PER_RAD = 10800.0 / math.pi
 """Inside all angles are in rad; screens and files show arcminutes."""
 MOST_DECIMALS = 8
 UNDEFINED = "not defined"
+ENDS = ("median", "lo", "hi")
+"""Keys of an interval."""
 _LARGEST_PLAIN = 1e7  # longer numbers are not read at a glance
 
 
@@ -27,7 +29,7 @@ def interval_text(interval: dict | None, factor: float = 1.0) -> str:
     """``median [lo, hi]`` times ``factor`` with the same decimals; "not defined" for None."""
     if interval is None:
         return UNDEFINED
-    median, lo, hi = (factor * interval[k] for k in ("median", "lo", "hi"))
+    median, lo, hi = (factor * interval[k] for k in ENDS)
     if max(abs(lo), abs(median), abs(hi)) < 0.5 * 10**-MOST_DECIMALS:
         lo = median = hi = 0.0
     n = decimals(0.5 * (hi - lo), median)
@@ -71,6 +73,12 @@ def significant(value: float | None, digits: int = 3, factor: float = 1.0) -> st
     if not -6 <= power <= 6:
         return f"{value:.{digits - 1}e}".replace("-", "−")
     return _fixed(value, max(0, digits - 1 - power))
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A torque or a rate that was set, to some significant digits, without zeros at its end."""
+    text = significant(value, digits)
+    return text.rstrip("0").rstrip(".") if "." in text and "e" not in text else text
 
 
 def probability_text(probability: float | None) -> str:

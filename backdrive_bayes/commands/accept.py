@@ -12,9 +12,9 @@ from backdrive_bayes.commands.results import (
     FitOptions,
     add_fit_arguments,
     diagnose_unit,
-    draw_figures,
     fit_unit,
     is_result,
+    keep_decision,
     keep_fit,
     keep_run,
     refuse_company,
@@ -75,10 +75,8 @@ def run(args) -> int:
                 posterior, indicators = made
                 verdict["posterior_sha256"] = keep_fit(posterior, indicators, folder, not args.no_figures, note)
                 retire(out, indicators)
-            write_json(folder / "verdict.json", verdict)
+            keep_decision(verdict, "verdict.json", out, folder, not args.no_figures)
             keep_run(folder, "accept", began)
-            if not args.no_figures:
-                draw_figures("verdict.json", folder)
     _summarise(verdict, evidence.about, out)
     return verdict["outcome"]["exit_code"]
 

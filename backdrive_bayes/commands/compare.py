@@ -6,14 +6,14 @@ import time
 from pathlib import Path
 
 from backdrive_bayes.commands.door import collected, ready_unit, repeat_findings
-from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
+from backdrive_bayes.commands.output import default_out, require_out, say, write_folder
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
     FitOptions,
     add_fit_arguments,
-    draw_figures,
     fit_unit,
     is_result,
+    keep_decision,
     keep_fit,
     keep_run,
     stamped_by,
@@ -59,10 +59,8 @@ def run(args) -> int:
         for name, (posterior, own) in made.items():
             (folder / name).mkdir()
             keep_fit(posterior, own, folder / name, not args.no_figures, note)
-        write_json(folder / "comparison.json", result)
+        keep_decision(result, "comparison.json", out, folder, not args.no_figures)
         keep_run(folder, "compare", began)
-        if not args.no_figures:
-            draw_figures("comparison.json", folder)
     _summarise(result, out)
     return result["outcome"]["exit_code"]
 

@@ -9,6 +9,7 @@ from backdrive_bayes.commands.door import ready_unit
 from backdrive_bayes.commands.output import default_out, require_out, say, write_folder, write_json
 from backdrive_bayes.commands.progress import progress
 from backdrive_bayes.commands.results import (
+    DIAGNOSIS_FIGURES,
     FitOptions,
     add_fit_arguments,
     diagnose_unit,
@@ -17,6 +18,7 @@ from backdrive_bayes.commands.results import (
     keep_run,
     refuse_company,
     retire,
+    retire_figures,
 )
 from backdrive_bayes.commands.stages import DIAGNOSE, DIAGNOSE_SIMULATED
 from backdrive_bayes.commands.tables import show_indicators, show_simulator, show_which
@@ -57,6 +59,7 @@ def run(args) -> int:
             posterior, indicators = sampled
             keep_fit(posterior, indicators, folder, figures=False)
             retire(out, sampled[1])
+        retire_figures(out, DIAGNOSIS_FIGURES)
         if not args.no_figures:
             draw_figures("diagnosis.json", folder)
     _summarise(result, sampled, out)

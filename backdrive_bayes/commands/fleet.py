@@ -10,7 +10,7 @@ from pathlib import Path
 
 from backdrive_bayes.commands.output import default_out, say, write_json
 from backdrive_bayes.commands.progress import progress
-from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, draw_figures, keep_run
+from backdrive_bayes.commands.results import FitOptions, add_fit_arguments, draw_figures, keep_run, retire_figures
 from backdrive_bayes.decisions.outcome import line, outcome_of
 from backdrive_bayes.errors import BadInput
 
@@ -62,6 +62,7 @@ def run(args) -> int:
         result["outcome"] = outcome_of(result).to_json()
         write_json(out / NAME, result)
         keep_run(out, "fleet", began)
+        retire_figures(out, ("",))
         if not args.no_figures:
             draw_figures("fleet.json", out)
         pools = _pools(args, job, units, found, client)

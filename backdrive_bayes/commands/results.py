@@ -12,6 +12,7 @@ from pathlib import Path
 
 from backdrive_bayes.commands.door import add_force_argument, ready_unit
 from backdrive_bayes.commands.output import say, write_json
+from backdrive_bayes.commands.report import NAME as REPORT
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.errors import BadInput, MissingExtra
 from backdrive_bayes.results import CHECK, DIAGNOSIS, read_result, require_same_data
@@ -23,6 +24,8 @@ __all__ = ["FitOptions", "add_fit_arguments", "diagnose_unit", "draw_figures", "
 FIT_FILES = ("posterior.nc", "indicators.json")
 DIAGNOSIS_FIGURES = ("diagnosis", "gap-", "closed-fraction", "parameter-shift")
 """How the names of a diagnosis's figures begin."""
+DECISION_FIGURES = {"verdict.json": "acceptance", "comparison.json": "comparison"}
+"""How the names of a decision's figures begin, by its file."""
 
 
 @dataclass(frozen=True)
@@ -176,6 +179,14 @@ def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=l
     return digest
 
 
+def keep_decision(result: dict, name: str, out: Path, folder: Path, figures: bool) -> None:
+    """Write a verdict or a comparison and its figures into ``folder``, which becomes ``out``; those of an older one go."""
+    retire_figures(out, (DECISION_FIGURES[name],))
+    write_json(folder / name, result)
+    if figures:
+        draw_figures(name, folder)
+
+
 def keep_run(folder: Path, verb: str, began_s: float) -> None:
     """Write run.json: how long it took since ``began_s`` of time.perf_counter, and on what machine; no result depends on it."""
     facts = {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()}
@@ -190,11 +201,18 @@ def retire(out: Path, result: dict) -> None:
     """
     (out / "verdict.json").unlink(missing_ok=True)
     kept = [_keep_own(out / name, schema, result) for name, schema in (("diagnosis.json", DIAGNOSIS), ("check.json", CHECK))]
-    for figure in (out / "figures").glob("*.*g"):
-        if not (kept[0] and figure.name.startswith(DIAGNOSIS_FIGURES)) and figure.suffix in (".svg", ".png"):
-            figure.unlink()
+    retire_figures(out, ("",), DIAGNOSIS_FIGURES if kept[0] else ())
     with contextlib.suppress(OSError):  # it is not there, or holds what stays
         (out / "figures").rmdir()
+
+
+def retire_figures(out: Path, kinds: tuple[str, ...], kept: tuple[str, ...] = ()) -> None:
+    """Take away the figures in ``out`` whose names begin with one of ``kinds`` and none of ``kept``, and the report that has
+    them: a later result may have fewer."""
+    (out / REPORT).unlink(missing_ok=True)
+    for figure in (out / "figures").glob("*.*g"):
+        if figure.name.startswith(kinds) and not figure.name.startswith(kept) and figure.suffix in (".svg", ".png"):
+            figure.unlink()
 
 
 def _keep_own(path: Path, schema: str, about: dict) -> bool:

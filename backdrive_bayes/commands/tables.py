@@ -13,6 +13,7 @@ from backdrive_bayes.number_text import (
     level_text,
     like_interval,
     marked,
+    plain,
     probability_text,
     share_text,
 )
@@ -149,7 +150,7 @@ def _record(record: dict) -> str:
 
 def _condition(row: dict) -> str:
     predicted = " (predicted)" if row.get("predicted") else ""
-    return f"{row['loading_rate_Nm_per_s']:.3g}, ±{row['amplitude_Nm']:.3g}{predicted}"
+    return f"{plain(row['loading_rate_Nm_per_s'])}, ±{plain(row['amplitude_Nm'])}{predicted}"
 
 
 def _cell(interval: dict | None, factor: float = 1.0, provisional: bool = False) -> str:

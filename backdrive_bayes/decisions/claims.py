@@ -15,6 +15,7 @@ from backdrive_bayes.decisions.quantities import Quantities
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import LOADED
 from backdrive_bayes.indicators.same_loop import same_rate
+from backdrive_bayes.number_text import plain
 from backdrive_bayes.schemas.claims_file import ClaimsFile, ClaimTable
 from backdrive_bayes.schemas.toml_file import read_typed
 
@@ -108,7 +109,7 @@ def _ask(claim, units, quantities):
         if not claim.is_probability and value.dtype != bool:
             raise Wrong("expected a comparison, found a number")
         held.append(value[:, 0] if value.ndim == 2 else np.broadcast_to(value, (quantities.draws,)))
-        where = "" if len(contexts) == 1 and claim.every != "rate" else f"{context[0]:.3g} N·m/s"
+        where = "" if len(contexts) == 1 and claim.every != "rate" else f"{plain(context[0])} N·m/s"
         numbers += [_number(claim, part, look_up, along, where) for part in claim.holds.parts()]
     sizes = {h.size for h in held}
     if len(sizes) > 1:

@@ -16,6 +16,7 @@ from backdrive_bayes.engine.posterior_read import read_posterior
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.draws import IndicatorDraws
 from backdrive_bayes.indicators.same_loop import same_amplitude
+from backdrive_bayes.number_text import plain
 from backdrive_bayes.results import (
     DIAGNOSIS,
     INDICATORS,
@@ -74,7 +75,7 @@ def same_lost_motion(evidences) -> None:
     """Raise NotAvailable where the units' lost motions were taken at different torques and must not be compared."""
     taken = [e.about["k"] * e.rated_torque for e in evidences]
     if any(not same_amplitude(taken[0], t) for t in taken[1:]):
-        shown = " and ".join(f"±{t:.3g} N·m" for t in taken)
+        shown = " and ".join(f"±{plain(t)} N·m" for t in taken)
         raise NotAvailable(f"lost motion was taken at {shown}: give the same k·T_r")
 
 
@@ -83,7 +84,8 @@ def same_load(evidences, amplitudes) -> None:
     as the amplitude, but no larger than the rated torque."""
     loads = [min(e.rated_torque, a) for e, a in zip(evidences, amplitudes, strict=True)]
     if any(not same_amplitude(loads[0], load) for load in loads[1:]):
-        raise NotAvailable(f"loads are {' and '.join(f'{load:.3g} N·m' for load in loads)}: ask at one amplitude within both T_r")
+        shown = " and ".join(f"{plain(load)} N·m" for load in loads)
+        raise NotAvailable(f"loads are {shown}: ask at one amplitude within both T_r")
 
 
 @dataclass(frozen=True, eq=False)

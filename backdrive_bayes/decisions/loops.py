@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
+from backdrive_bayes.number_text import plain
 
 SMALLEST = 0.05
 """Smallest amplitude that is predicted, as a share of the measured one."""
@@ -33,7 +34,7 @@ class Loop:
     @property
     def text(self) -> str:
         """In words."""
-        return f"{self.rate:.3g} N·m/s, ±{self.amplitude:.3g} N·m{' (predicted)' if self.predicted else ''}"
+        return f"{plain(self.rate)} N·m/s, ±{plain(self.amplitude)} N·m{' (predicted)' if self.predicted else ''}"
 
 
 def measured_loops(rates, amplitudes) -> tuple[Loop, ...]:
@@ -73,8 +74,8 @@ def find_loop(measured, rate: float, amplitude: float | None = None) -> Loop:
     """
     at_rate = [x for x in measured if same_rate(x.rate, rate)]
     if not at_rate:
-        shown = ", ".join(f"{x.rate:.3g}" for x in largest_loops(measured))
-        raise NotAvailable(f"rate {rate:.3g} N·m/s was not measured (only {shown} N·m/s) and rates cannot be predicted")
+        shown = ", ".join(f"{plain(x.rate)}" for x in largest_loops(measured))
+        raise NotAvailable(f"rate {plain(rate)} N·m/s was not measured (only {shown} N·m/s) and rates cannot be predicted")
     top = max(at_rate, key=lambda x: x.amplitude)
     if amplitude is None:
         return top
@@ -82,9 +83,9 @@ def find_loop(measured, rate: float, amplitude: float | None = None) -> Loop:
     if exact:
         return replace(min(exact, key=lambda x: abs(x.amplitude - amplitude)), amplitude=float(amplitude))
     if amplitude > top.amplitude:
-        most = f"{top.amplitude:.3g} N·m at {top.rate:.3g} N·m/s"
-        raise NotAvailable(f"amplitude {amplitude:.3g} N·m lies beyond the measured {most}")
+        most = f"{plain(top.amplitude)} N·m at {plain(top.rate)} N·m/s"
+        raise NotAvailable(f"amplitude {plain(amplitude)} N·m lies beyond the measured {most}")
     lowest = top.amplitude * SMALLEST
     if amplitude < lowest * (1 - ROUNDING):
-        raise NotAvailable(f"amplitude {amplitude:.3g} N·m is below {lowest:.3g} N·m, the smallest that is predicted")
+        raise NotAvailable(f"amplitude {plain(amplitude)} N·m is below {plain(lowest)} N·m, the smallest that is predicted")
     return Loop(top.rate, float(amplitude), top.records, True)

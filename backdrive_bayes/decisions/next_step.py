@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backdrive_bayes.decisions.conformance import normal_conformance
+from backdrive_bayes.number_text import plain
 
 MOST = 100
 """Repeats beyond which measuring again is no advice."""
@@ -27,7 +28,7 @@ def repeats_to_settle(rows, consumer: float, producer: float) -> int | None:
 
 def advice(row: dict, repeats: int | None) -> str:
     """One sentence for an inconclusive verdict and its limiting row."""
-    where = f"{row['loading_rate_Nm_per_s']:.3g} N·m/s and ±{row['amplitude_Nm']:.3g} N·m"
+    where = f"{plain(row['loading_rate_Nm_per_s'])} N·m/s and ±{plain(row['amplitude_Nm'])} N·m"
     if row["predicted"]:
         return f"Measure a loop at {where} itself: the verdict on {row['indicator']} rests on a prediction from a larger loop."
     if repeats is not None:

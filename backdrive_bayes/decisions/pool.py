@@ -12,6 +12,7 @@ from backdrive_bayes.decisions.global_risk import NODES, REACH, GlobalRisks
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.intervals import interval
 from backdrive_bayes.indicators.same_loop import same_amplitude, same_rate
+from backdrive_bayes.number_text import plain
 from backdrive_bayes.results import POOL, read_result
 
 NAME = "pool.json"
@@ -98,9 +99,9 @@ class Pool:
         """
         taken = self.about["k"] * self.about["rated_torque_Nm"]
         if name == "lost_motion_rad" and not same_amplitude(taken, lost_motion_at):
-            raise BadInput(self.where, f"lost motion at ±{lost_motion_at:.3g} N·m", f"at ±{taken:.3g} N·m")
+            raise BadInput(self.where, f"lost motion at ±{plain(lost_motion_at)} N·m", f"at ±{plain(taken)} N·m")
         found = next((q for q in self.about["quantities"] if q["name"] == name and _same_loop(q, rate, amplitude)), None)
-        at = f"{name} at {rate:.3g} N·m/s, ±{amplitude:.3g} N·m"
+        at = f"{name} at {plain(rate)} N·m/s, ±{plain(amplitude)} N·m"
         if found is None:
             raise BadInput(self.where, f"{at} among what was pooled", "none")
         if found["refused"]:

@@ -8,6 +8,7 @@ from backdrive_bayes.decisions.evidence import Evidence
 from backdrive_bayes.decisions.expression import Wrong
 from backdrive_bayes.decisions.loops import Loop, NotAvailable
 from backdrive_bayes.indicators.draws import CORE, MOVED, POSITIONS, RESPONSES
+from backdrive_bayes.number_text import plain
 
 PAIRINGS = 8
 _CLASSIC = ("r_squared", "rms_rad", "rms_high_load_over_rest")
@@ -91,7 +92,7 @@ class Quantities:
                 raise Wrong("expected width_rad(torque=…) or along = \"torque\"")
             at = keywords["torque"]
             if abs(at) > torque[-1] * (1 + 1e-6):
-                raise NotAvailable(f"torque {at:g} N·m lies beyond the loop's {torque[-1]:.3g} N·m")
+                raise NotAvailable(f"torque {at:g} N·m lies beyond the loop's {plain(torque[-1])} N·m")
             ends = [_interpolate(torque, width, t) for t in (-at, at)]
             return np.mean(ends, axis=0)[order][:, None]
         return np.stack([_interpolate(torque, width, t) for t in along], axis=1)[order]

@@ -12,6 +12,7 @@ from backdrive_bayes.engine.predictive import block_offsets
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.history import loading_rate, through
 from backdrive_bayes.mechanics.part import TOP
+from backdrive_bayes.number_text import plain
 
 MOST_NODES = 20_000
 """Samples at which the class is evaluated; between them, on one monotone run, curves are straight."""
@@ -88,8 +89,8 @@ def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:
     reach = LONE_RATE_REACH if lone else RATE_REACH
     if low / reach <= rate <= reach * high:
         return ""
-    measured = f"the only one measured, {high:.3g} N·m/s" if lone else f"those measured, {low:.3g} to {high:.3g} N·m/s"
-    return f"the loading rate of {rate:.3g} N·m/s is far from {measured}: what it does to the angle is extrapolated"
+    measured = f"the only one measured, {plain(high)} N·m/s" if lone else f"those measured, {plain(low)} to {plain(high)} N·m/s"
+    return f"the loading rate of {plain(rate)} N·m/s is far from {measured}: what it does to the angle is extrapolated"
 
 
 def _from(posterior, time, torque, rate, preload_nm):

@@ -25,7 +25,7 @@ from backdrive_bayes.figures import (
 from backdrive_bayes.figures.diagnosis_saved import FILE as DIAGNOSIS
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import PER_FIGURE, PNG_DPI, SERIES, Figure, numbered, settled, styled
+from backdrive_bayes.figures.style import PER_FIGURE, PNG_DPI, SERIES, Figure, in_parts, numbered, settled, styled
 from backdrive_bayes.results import BLIND, COMPARISON, FLEET, POOL, VERDICT, read_result
 
 CAPTIONS = {
@@ -87,9 +87,9 @@ def verdict_figures(verdict: dict) -> dict[str, Figure]:
 
 def comparison_figures(result: dict) -> dict[str, Figure]:
     """The figures of a comparison object."""
-    overlays = list(range(len(result["overlays"])))
-    makers = numbered("comparison-loops", comparison.draw_loops, result, overlays, PER_FIGURE)
-    makers |= numbered("comparison-energy", comparison.draw_energy, result, overlays, PER_FIGURE)
+    overlays = comparison.overlaid(result)
+    makers = in_parts("comparison-loops", comparison.draw_loops, result, overlays)
+    makers |= in_parts("comparison-energy", comparison.draw_energy, result, overlays)
     makers |= numbered("comparison-ratios", comparison.draw_ratios, result, comparison.with_ratios(result), 1)
     makers["comparison-mechanism"] = partial(comparison.draw_mechanism, result)
     return settled({name: make() for name, make in makers.items()})

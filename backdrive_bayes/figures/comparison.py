@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from backdrive_bayes.figures.fonts import drawn_name
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
     MJ_PER_J,
     ORANGE,
+    PER_FIGURE,
     SERIES,
     SKY,
     drawn_words,
@@ -16,6 +18,7 @@ from backdrive_bayes.figures.style import (
     legend_below,
     loop_words,
     new_figure,
+    parts,
     reach,
     styled,
 )
@@ -38,13 +41,23 @@ MOST_OF_S = 1.5
 SHARES = (("S_g_over_S", "geometric error", BLUE, ""), ("S_f_over_S", "friction", ORANGE, "////"))
 
 
-def draw_loops(comparison: dict, conditions: list[int]):
-    """Overlaid loops at the given overlays (at most three), angle [arcmin] over torque [N·m]."""
+def overlaid(comparison: dict) -> list[list[tuple[int, tuple[int, ...]]]]:
+    """Figures of overlays: in each at most so many units as there are looks, at the conditions that some of them share."""
+    groups = [tuple(group) for group in parts(list(range(len(comparison["names"]))), len(SERIES))]
+    found = []
+    for group in groups:
+        shared = [(o, group) for o in range(len(comparison["overlays"])) if any(_members(comparison, o, group))]
+        found += parts(shared, PER_FIGURE)
+    return found
+
+
+def draw_loops(comparison: dict, conditions: list[tuple[int, tuple[int, ...]]]):
+    """Overlaid loops at the given overlays (at most three) of a group of units, angle [arcmin] over torque [N·m]."""
     return _overlaid(comparison, conditions, 2.3, _one_loop, "angle [arcmin]", xlabel="torque [N·m]")
 
 
-def draw_energy(comparison: dict, conditions: list[int]):
-    """Overlaid torque–energy curves at the given overlays (at most three), mJ per N·m over |torque| [N·m]."""
+def draw_energy(comparison: dict, conditions: list[tuple[int, tuple[int, ...]]]):
+    """Overlaid torque–energy curves at the given overlays (at most three) of a group of units, mJ per N·m over |torque| [N·m]."""
     looks = {"xlabel": "|torque| [N·m]", "xlim": (0, None), "ylim": (0, None)}
     return _overlaid(comparison, conditions, 2.9, _one_energy, "energy per torque\n[mJ/(N·m)]", **looks)
 
@@ -55,12 +68,12 @@ def _overlaid(comparison, conditions, height, draw, ylabel, **looks):
         figure = new_figure(height)
         axes = _panels(figure, comparison, conditions)
         for panel, condition in zip(axes, conditions, strict=True):
-            for record, look, name in _members(comparison, condition):
+            for record, look, name in _members(comparison, *condition):
                 draw(panel, record, look, name)
         for panel in axes:  # only now: limits of a shared axis would hold for panels still to be drawn
             panel.set(**looks)
         axes[0].set_ylabel(ylabel)
-        legend_below(figure, axes[0], columns=4)
+        legend_below(figure, *axes, columns=4)
     return figure
 
 
@@ -78,7 +91,7 @@ def draw_ratios(comparison: dict, pairs: list[int]):
         panel = figure.subplots()
         step = 0.7 / max(1, len(both["conditions"]))
         for i, condition in enumerate(both["conditions"]):
-            look, label = SERIES[i % len(SERIES)], loop_words(condition)
+            look, label = SERIES[i % len(SERIES)], loop_words(condition) + ", predicted" * bool(condition.get("predicted"))
             for row, name in enumerate(shown):
                 ratio = (condition["indicators"].get(name) or {}).get("ratio")
                 if ratio:
@@ -90,7 +103,7 @@ def draw_ratios(comparison: dict, pairs: list[int]):
         panel.axvline(1.0, color="black", linewidth=0.7)
         panel.set(xscale="log", yticks=range(len(shown)), ylim=(len(shown) - 0.45, -0.55))
         panel.set_yticklabels([drawn_words(name) for name in shown])
-        panel.set_xlabel(f"ratio: {_short(both['first'])} over {_short(both['second'])} [–]")
+        panel.set_xlabel(f"ratio: {drawn_name(both['first'])} over {drawn_name(both['second'])} [–]")
         _plain_log(panel)
         legend_below(figure, panel, columns=3)
     return figure
@@ -109,7 +122,7 @@ def draw_mechanism(comparison: dict):
             _bar(right, record["elastic_share"], row, 0.0, "given back", SKY, "")
         left.axvline(1.0, color="black", linewidth=0.7)
         left.set(xlim=(0, min(max(1.0, left.get_xlim()[1]), MOST_OF_S)), xlabel="share of S [–]", ylim=(len(bars) - 0.5, -0.5))
-        left.set_yticks(range(len(bars)), [f"{_short(name)}, {loop_words(r)}" for name, r in bars])
+        left.set_yticks(range(len(bars)), [f"{drawn_name(name)}, {loop_words(r)}" for name, r in bars])
         right.set(xlim=(0, 1), xlabel="given back/absorbed [–]")
         legend_below(figure, left, right, columns=3)
     return figure
@@ -127,17 +140,18 @@ def _bar(panel, interval, row, begin, name, colour, hatch) -> float:
 
 def _panels(figure, comparison, conditions):
     axes = figure.subplots(1, len(conditions), sharey=True, squeeze=False)[0]
-    for panel, condition in zip(axes, conditions, strict=True):
-        panel.set_title(loop_words(comparison["overlays"][condition]))
+    for panel, (overlay, _) in zip(axes, conditions, strict=True):
+        panel.set_title(loop_words(comparison["overlays"][overlay]))
         few_ticks(panel, {1: 10, 2: 6, 3: 4}[len(conditions)])
     return axes
 
 
-def _members(comparison, condition):
-    """Record object, look and name of every unit in an overlay."""
-    for member in comparison["overlays"][condition]["units"]:
+def _members(comparison, overlay, group):
+    """Record object, look and name of every unit of a group in an overlay."""
+    for member in comparison["overlays"][overlay]["units"]:
         unit = comparison["names"].index(member["unit"])
-        yield comparison["units"][unit]["records"][member["record"]], SERIES[unit % len(SERIES)], _short(member["unit"])
+        if unit in group:
+            yield comparison["units"][unit]["records"][member["record"]], SERIES[unit % len(SERIES)], drawn_name(member["unit"])
 
 
 def _one_loop(panel, record, look, name):
@@ -174,7 +188,3 @@ def _plain_log(panel):
     ticks = [t for t in ticks if low <= t <= high]
     panel.set_xticks(ticks, [f"{t:g}" for t in ticks])
     panel.minorticks_off()
-
-
-def _short(name: str, most: int = 24) -> str:
-    return name if len(name) <= most else name[: most - 1] + "…"

@@ -47,7 +47,7 @@ def shared_parameters(saved: Saved) -> dict[str, tuple[np.ndarray, str]]:
         if name in posterior and posterior[name].dims == ("chain", "draw"):
             factor, unit = display_unit(about["unit"])
             values = posterior[name].values * factor
-            if unit == "N·m" and np.median(np.abs(values)) < 0.1:
+            if unit == "N·m" and np.quantile(np.abs(values), 0.95) < 0.1:
                 values, unit = values * 1e3, "mN·m"
             out[name] = values, unit
     return out

@@ -16,7 +16,8 @@ from backdrive_bayes.figures import (
 )
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.figures.diagnosis_which import bar_lines, draw_bars
-from backdrive_bayes.figures.diagnosis_words import answer_words, drawable
+from backdrive_bayes.figures.diagnosis_words import answer_words
+from backdrive_bayes.figures.fonts import drawable
 from backdrive_bayes.figures.style import PER_FIGURE, Figure, new_figure, numbered, settled, styled
 
 CAPTION = (

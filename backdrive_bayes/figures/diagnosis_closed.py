@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import drawable
+from backdrive_bayes.figures.fonts import drawable
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,

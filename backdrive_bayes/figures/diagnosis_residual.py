@@ -10,7 +10,8 @@ from backdrive_bayes.figures.style import RISING, legend_below, new_figure, styl
 
 CAPTION = (
     "Measured minus modelled angle along the loop, before (baseline alone, or the simulator as it is) and after the chosen "
-    "effect is added; little that is left is shown once more on its own scale."
+    "effect is added; little that is left is shown once more on its own scale. The first loading, which is not fitted, is left "
+    "out."
 )
 ZOOM = 3.0
 """Where the residual shrinks by this factor, what is left gets a row with a scale of its own."""
@@ -22,7 +23,7 @@ def draw(saved: Diagnosed, records: list[int]):
     Where little is left, what is left is shown once more on its own scale.
     """
     entries = by_record(saved)
-    rows = _rows([entries[r] for r in records]) if saved.enlarged and not saved.inside else [("before_rad", "residual")]
+    rows = _rows([entries[r] for r in records]) if saved.added else [("before_rad", "residual")]
     with styled():
         figure = new_figure(0.85 + 1.05 * len(rows))
         axes = draw_panels(figure, saved, records, rows, _points, 5)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from statistics import NormalDist
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import FAR, drawable, parameter_words, signed
+from backdrive_bayes.figures.diagnosis_words import FAR, parameter_words, signed
+from backdrive_bayes.figures.fonts import drawable
 from backdrive_bayes.figures.style import BLUE, VERMILLION, few_ticks, legend_below, new_figure, styled
 
 CAPTION = (

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import chance, drawable, hypothesis_words
+from backdrive_bayes.figures.diagnosis_words import chance, hypothesis_words
+from backdrive_bayes.figures.fonts import drawable
 from backdrive_bayes.figures.style import BLUE, GREY, matplotlib
 
 LONGEST = 27

@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-import unicodedata
-
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed, Hypothesis
-from backdrive_bayes.figures.fonts import uncovered
 from backdrive_bayes.figures.style import words
 
-_INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
 FAR = 1000.0
 """Standard deviations beyond which a shift is no longer told or drawn: the parameter was as good as fixed."""
 WORTH_A_WORD = 0.1
 """Probability from which on it is said that something acts beside what is named."""
 _GLOSS = {"unknown": "unknown (not listed)", "none": "none (no gap)"}
-
-
-def drawable(text, longest: int) -> str:
-    """Somebody else's text in one line of at most ``longest`` characters; what the font lacks is spelt out."""
-    text = " ".join(str(text).split())
-    missing = uncovered(text)
-    bad = {c for c in text if c in missing or unicodedata.category(c) in _INVISIBLE}
-    text = "".join(f"\\u{{{ord(c):X}}}" if c in bad else c for c in text)
-    return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def effect_words(effect: str) -> str:

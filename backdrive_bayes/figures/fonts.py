@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import unicodedata
 from functools import cache
 from pathlib import Path
 
-from backdrive_bayes.figures.style import matplotlib
+from backdrive_bayes.figures.style import matplotlib, shortened
+
+_INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn"}
 
 
 def font_folder() -> Path:
@@ -32,3 +35,18 @@ def uncovered(text: str, font_files=()) -> set[str]:
             break
         missing = {c for c in missing if ord(c) not in characters(Path(file))}
     return missing
+
+
+def drawable(text, longest: int) -> str:
+    """Somebody else's text in one line of at most ``longest`` characters; what the font lacks is spelt out."""
+    text = " ".join(str(text).split())
+    missing = uncovered(text)
+    bad = {c for c in text if c in missing or unicodedata.category(c) in _INVISIBLE}
+    text = "".join(f"\\u{{{ord(c):X}}}" if c in bad else c for c in text)
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def drawn_name(name: str, most: int = 24) -> str:
+    """A unit's name, shortened, for a figure: what begins with an underscore would be left out of legends."""
+    text = shortened(drawable(shortened(name, most), 3 * most), most + most // 3)
+    return f" {text}" if text.startswith("_") else text

@@ -20,7 +20,7 @@ from backdrive_bayes.number_text import ARCMIN_PER_RAD
 CAPTION = (
     "Measured angle against torque (block means, encoder offset removed) with the reducer's settled loop: "
     "median and interval. Beneath: measured minus predicted angle; grey bars span the interval of "
-    "replicated data. The first loading hangs on what was before it and is not fitted."
+    "replicated data. The first loading hangs on what was before it, is not fitted and has none."
 )
 
 
@@ -73,8 +73,9 @@ def _loop(axes, saved, record):
 def _residual(axes, saved, record):
     blocks = record_blocks(saved, record)
     lo, hi = blocks.residual_band_rad(saved.indicators["level"]) * ARCMIN_PER_RAD
-    axes.vlines(blocks.torque_nm, lo, hi, color=GREY, alpha=0.35, linewidth=1.0)
-    for _, mask, colour, marker in _kinds(blocks):
+    fitted = ~blocks.first
+    axes.vlines(blocks.torque_nm[fitted], lo[fitted], hi[fitted], color=GREY, alpha=0.35, linewidth=1.0)
+    for _, mask, colour, marker in _kinds(blocks)[1:]:
         _points(axes, blocks.torque_nm[mask], blocks.residual_rad[mask], colour, marker, None)
     axes.axhline(0, color="black", linewidth=0.6)
 

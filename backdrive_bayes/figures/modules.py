@@ -15,7 +15,7 @@ from backdrive_bayes.figures.style import (
     styled,
     words,
 )
-from backdrive_bayes.number_text import ARCMIN_PER_RAD
+from backdrive_bayes.number_text import ARCMIN_PER_RAD, plain
 
 CAPTION = (
     "The settled loop as the sum of its modules (median curves) and of the effects, which are the loop minus the sum of the "
@@ -63,7 +63,8 @@ def draw(saved: Saved, records: list[int]):
             panel.plot(torque, np.multiply(rising, ARCMIN_PER_RAD), **RISING, label="rising torque")
             panel.plot(torque, np.multiply(falling, ARCMIN_PER_RAD), **FALLING, label="falling torque")
             panel.set_title(name)
-            few_ticks(panel, 3)
+            few_ticks(panel, None)
+            _three_ticks(panel, float(np.max(np.abs(torque))))
             panel.tick_params(labelbottom=True)
             panel.set_xlabel("torque [N·m]")
         _scales(axes, curves)
@@ -79,6 +80,13 @@ def _curves(record):
     seen = max(np.ptp(r) for r in rest) >= VISIBLE * max(np.ptp(b) for b in loop)
     effects = [("effects", *rest)] if seen else []
     return [("settled loop", *loop), *((words(m), *c) for m, c in modules.items()), *effects]
+
+
+def _three_ticks(panel, largest):
+    """Zero and the largest torque of one digit within the loop, to either side: panels are narrow."""
+    power = 10.0 ** np.floor(np.log10(largest))
+    at = float(np.floor(largest / power * (1.0 + 1e-9)) * power)
+    panel.set_xticks([-at, 0.0, at], [f"−{plain(at)}", "0", plain(at)])
 
 
 def _scales(axes, curves):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from backdrive_bayes.figures.fonts import drawn_name
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -17,7 +18,7 @@ from backdrive_bayes.figures.style import (
     styled,
     two_lines,
 )
-from backdrive_bayes.number_text import level_text
+from backdrive_bayes.number_text import level_text, plain
 
 CAPTIONS = {
     "pool-units": "Units of the batch in order of the first indicator, with {level} intervals: each by itself (grey) and with "
@@ -62,7 +63,7 @@ def unit_of(quantity: dict) -> tuple[float, str]:
 
 def quantity_words(quantity: dict, loops: int) -> str:
     """A quantity in words, with its loop where the batch has several."""
-    at = f" at {quantity['loading_rate_Nm_per_s']:.2g} N·m/s" if quantity["amplitude_Nm"] is not None and loops > 1 else ""
+    at = f" at {plain(quantity['loading_rate_Nm_per_s'])} N·m/s" if quantity["amplitude_Nm"] is not None and loops > 1 else ""
     return f"{drawn_words(quantity['name'])}{at}"
 
 
@@ -74,7 +75,7 @@ def _units(chosen):
     for axes, quantity in zip(figure.subplots(1, len(chosen), sharey=True, squeeze=False)[0], chosen, strict=True):
         _panel(axes, quantity, order)
     first = figure.axes[0]
-    first.set_yticks(range(len(order)), [_short(name) for name in order])
+    first.set_yticks(range(len(order)), [drawn_name(name, 18) for name in order])
     first.tick_params(axis="y", length=0, labelsize=7)
     first.set_ylim(len(order) - 0.4, -0.6)
     legend_below(figure, *figure.axes, columns=5)
@@ -103,10 +104,6 @@ def _panel(axes, quantity, order):
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0)
     few_ticks(axes, 4, None)
-
-
-def _short(name):
-    return name if len(name) <= 18 else f"…{name[-17:]}"
 
 
 def _spreads(quantities):

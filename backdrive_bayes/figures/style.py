@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import partial
 
 from backdrive_bayes.errors import MissingExtra
-from backdrive_bayes.number_text import ARCMIN_PER_RAD
+from backdrive_bayes.number_text import ARCMIN_PER_RAD, plain
 
 try:
     with warnings.catch_warnings():
@@ -107,7 +107,7 @@ def settled(figures: dict[str, Figure]) -> dict[str, Figure]:
     return figures
 
 
-def few_ticks(axes, x: int = 4, y: int | None = 5) -> None:
+def few_ticks(axes, x: int | None = 4, y: int | None = 5) -> None:
     """At most ``x`` and ``y`` steps between round tick labels; None leaves that axis as it is."""
     for axis, most in ((axes.xaxis, x), (axes.yaxis, y)):
         if most is not None:
@@ -125,12 +125,17 @@ def legend_below(figure, *axes, columns: int, **look) -> None:
 
 def numbered(name: str, draw, saved, items: list, at_most: int) -> dict[str, partial]:
     """Functions that draw the parts of a figure by name (loop, loop-2, …), of nearly equal numbers of items."""
-    return {name if i == 0 else f"{name}-{i + 1}": partial(draw, saved, part) for i, part in enumerate(parts(items, at_most))}
+    return in_parts(name, draw, saved, parts(items, at_most))
+
+
+def in_parts(name: str, draw, saved, each: list[list]) -> dict[str, partial]:
+    """The same of parts that are known."""
+    return {name if i == 0 else f"{name}-{i + 1}": partial(draw, saved, part) for i, part in enumerate(each)}
 
 
 def loop_words(at: dict) -> str:
     """Loading rate and amplitude of a record object, or of anything else that has them."""
-    return f"{at['loading_rate_Nm_per_s']:.2g} N·m/s, ±{at['amplitude_Nm']:.2g} N·m"
+    return f"{plain(at['loading_rate_Nm_per_s'])} N·m/s, ±{plain(at['amplitude_Nm'])} N·m"
 
 
 def reach(interval: dict) -> list[list[float]]:
@@ -140,7 +145,7 @@ def reach(interval: dict) -> list[list[float]]:
 
 def record_labels(records) -> list[str]:
     """A short, unique name for each record object: its rate, with the amplitude or a number where rates repeat."""
-    labels = [f"{r['loading_rate_Nm_per_s']:.2g} N·m/s" for r in records]
+    labels = [f"{plain(r['loading_rate_Nm_per_s'])} N·m/s" for r in records]
     if len(set(labels)) < len(labels):
         labels = [loop_words(r) for r in records]
     if len(set(labels)) < len(labels):
@@ -214,6 +219,12 @@ def in_words(text: str) -> str:
     text = _SAVED_NAMES.sub(lambda m: indicator_words(m[1]), text)
     text = re.sub(r"(\d+(?:\.\d+)?) ?T_r\b", lambda m: f"{m[1]} {'of' if float(m[1]) < 1 else 'times'} the rated torque", text)
     return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![\w·])T_r\b", "the rated torque", text))
+
+
+def shortened(name: str, most: int = 24) -> str:
+    """A unit's name in at most so many characters, its middle left out: what tells units apart begins or ends it."""
+    name = " ".join(str(name).split())
+    return name if len(name) <= most else f"{name[: (most - 1) // 2]}…{name[-(most // 2) :]}"
 
 
 def words(name: str) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from backdrive_bayes.figures.saved import Saved
 from backdrive_bayes.figures.style import BLACK, BLUE, MJ_PER_J, few_ticks, legend_below, new_figure, record_labels, styled
+from backdrive_bayes.number_text import significant
 
 CAPTION = (
     "Torque–energy curve: energy dissipated per unit of torque, median and interval, with the ranges W1 "
@@ -26,7 +27,7 @@ def draw(saved: Saved, records: list[int]):
         for panel, record in zip(axes, records, strict=True):
             tau1, tau2 = _tau(saved, record)
             enlarged = draw_curve(panel, saved, record)
-            panel.set_title(f"{labels[record]}\nτ₁ {tau1:.2g}, τ₂ {tau2:.2g} N·m")
+            panel.set_title(f"{labels[record]}\nτ₁ {significant(tau1, 2)}, τ₂ {significant(tau2, 2)} N·m")
             panel.set_xlabel("low |torque| [N·m]" if enlarged else "|torque| [N·m]")
         axes[0].set_ylabel("energy per torque\n[mJ/(N·m)]")
         legend_below(figure, axes[0], columns=9)

@@ -151,11 +151,12 @@ def _next_test(found: Found, answers):
 def _residual(found: Found):
     rows, linear = [], found.fits[1].linear
     scale, left = linear.reduced.angle_scale_rad, [f.residual for f in found.fits]
-    for r, blocks in enumerate(linear.reduced.blocks):
-        residuals = [x[r] * scale for x in left]
+    for r, (blocks, own) in enumerate(zip(linear.reduced.blocks, linear.reduced.settled, strict=True)):
+        # The first loading is not fitted.
+        residuals = [x[r][own] * scale for x in left]
         rows.append({
-            "record": blocks.name, "torque_Nm": blocks.torque_nm.tolist(),
-            "direction": blocks.direction[blocks.leg].astype(int).tolist(),
+            "record": blocks.name, "torque_Nm": blocks.torque_nm[own].tolist(),
+            "direction": blocks.direction[blocks.leg][own].astype(int).tolist(),
             "before_rad": (residuals[0] - residuals[0].mean()).tolist(),
             "after_rad": (residuals[1] - residuals[1].mean()).tolist(),
             "noise_rad": float(np.sqrt(np.median(np.diag(linear.covariances[r])))) * scale,

@@ -8,6 +8,7 @@ from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.gap.shrink import Fitted
 from backdrive_bayes.mechanics.effect import GrowthEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
+from backdrive_bayes.number_text import plain
 
 POINTS = 80
 NODES = np.polynomial.hermite_e.hermegauss(41)
@@ -38,10 +39,10 @@ def _tests(linear):
     loop = np.array([0.0, 1.0, -1.0, 1.0])
     slow, fast, usual = 0.2 * rates.min(), 5.0 * rates.max(), float(np.median(rates))
     return {
-        f"repeat the loop at {slow * scale:.3g} N·m/s": (_path(loop, slow), slow),
-        f"repeat the loop at {fast * scale:.3g} N·m/s": (_path(loop, fast), fast),
+        f"repeat the loop at {plain(slow * scale)} N·m/s": (_path(loop, slow), slow),
+        f"repeat the loop at {plain(fast * scale)} N·m/s": (_path(loop, fast), fast),
         "repeat the same record": (_path(loop, usual), usual),
-        f"measure the loop at half the amplitude, ±{0.5 * scale:.3g} N·m": (_path(0.5 * loop, usual), usual),
+        f"measure the loop at half the amplitude, ±{plain(0.5 * scale)} N·m": (_path(0.5 * loop, usual), usual),
         "load in the negative direction first": (_path(-loop, usual), usual),
         "dwell for 30 s at each tip": (_path(loop, usual, 30.0), usual),
     }

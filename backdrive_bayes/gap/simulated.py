@@ -199,5 +199,6 @@ def _shrink(split, found, k):
 def _residual(split, rows):
     scale, left = split.linear.reduced.angle_scale_rad, split.residuals()
     keys = zip(("before_rad", "retuned_rad", "after_rad"), STAGES, strict=True)
-    stages = {key: [scale * (v - v.mean()) for v in left[stage]] for key, stage in keys}
+    settled = split.linear.reduced.settled
+    stages = {key: [scale * (v[own] - v[own].mean()) for v, own in zip(left[stage], settled, strict=True)] for key, stage in keys}
     return [row | {key: values[r].tolist() for key, values in stages.items()} for r, row in enumerate(rows)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, verdict_figures
-from backdrive_bayes.figures.style import display_unit, indicator_words, words
+from backdrive_bayes.figures.style import display_unit, indicator_words, loop_words, words
 from backdrive_bayes.number_text import interval_text, level_text, like_interval, marked, probability_text, significant
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.findings import PROVISIONAL, findings_blocks, warned
@@ -124,7 +124,7 @@ def _limiting(verdict):
 
 def _at(row):
     predicted = ", predicted" if row.get("predicted") else ""
-    return f"{row['loading_rate_Nm_per_s']:.2g} N·m/s, ±{row['amplitude_Nm']:.2g} N·m{predicted}"
+    return f"{loop_words(row)}{predicted}"
 
 
 def _percent(share):

@@ -88,7 +88,7 @@ def _whose(number):
 
 def _number(number):
     median = number["median"]
-    factor, unit = shown_unit(number["unit"], median if isinstance(median, list) else [median])
+    factor, unit = shown_unit(number["unit"], median if isinstance(median, list) else [median, number["lo"], number["hi"]])
     if isinstance(median, list):
         top, size = max(median), max(abs(v) for v in median)
         first, *_, last = (v if abs(v) > NOTHING * size else 0.0 for v in median)

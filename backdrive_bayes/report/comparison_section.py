@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, comparison_figures
-from backdrive_bayes.figures.style import indicator_words, shown_unit
-from backdrive_bayes.number_text import interval_text, level_text, marked, probability_text
+from backdrive_bayes.figures.style import indicator_words, loop_words, shortened, shown_unit
+from backdrive_bayes.number_text import ENDS, interval_text, level_text, marked, probability_text
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Paragraph, Picture, Signature, Table
 from backdrive_bayes.report.claims_section import claims
 from backdrive_bayes.report.findings import PROVISIONAL, findings_blocks, warned
@@ -26,7 +26,8 @@ def chapter(folder: Path) -> Chapter:
     level = result["level"]
     title = free("Comparison: " + ", ".join(result["names"]), 110)
     ratios = [n for n in figures if n.startswith("comparison-ratios")]
-    names = [n for n in ("comparison-loops", *ratios, "comparison-mechanism") if n in figures]
+    loops = [n for n in figures if n.startswith("comparison-loops")]
+    names = [n for n in (*loops, *ratios, "comparison-mechanism") if n in figures]
     return Chapter(
         title,
         [
@@ -75,6 +76,11 @@ def _banner(result):
         f"±{100 * result['rope']:.3g} %: {same}; undecided: {len(rows) - clear - same}; each at a probability of "
         f"{100 * result['clear']:.3g} %."
     )
+    pairs, compared = len(result["pairs"]), sum(bool(p["conditions"]) for p in result["pairs"])
+    if compared < pairs:
+        text = f"Of {pairs} pairs of units {compared} had a rate and an amplitude in common. {text}"
+    if any(c.get("predicted") for p in result["pairs"] for c in p["conditions"]):
+        text += " Where one of the two was measured further only, its smaller loop is predicted."
     return Banner("good", "COMPARED at matched rate and amplitude", text)
 
 
@@ -90,7 +96,7 @@ def _identity(result):
         known = unit.get("identity") or {}
         about = free("; ".join(str(known[k]) for k in ("description", "origin") if known.get(k)), 200)
         digest = fit.get("data_sha256")
-        rows.append((free(name, 24), Free("; ".join(filter(None, [about, digest and f"data SHA-256 {digests(digest)}"])))))
+        rows.append((free(shortened(name)), Free("; ".join(filter(None, [about, digest and f"data SHA-256 {digests(digest)}"])))))
     return Facts(rows)
 
 
@@ -122,14 +128,15 @@ def _legend(result):
 
 
 def _at(condition):
-    return f"{condition['loading_rate_Nm_per_s']:.2g} N·m/s, ±{condition['amplitude_Nm']:.2g} N·m"
+    predicted = f", predicted for {free(' and '.join(condition['predicted']), 60)}" if condition.get("predicted") else ""
+    return f"{loop_words(condition)}{predicted}"
 
 
 def _table(pair, condition, names, usable):
     rows, provisional = [], [pair[k] not in usable for k in ("first", "second")]
     for name in (n for n in names if n in condition["indicators"]):
         row = condition["indicators"][name]
-        factor, unit = shown_unit(row["unit"], [row[k]["median"] for k in ("first", "second")])
+        factor, unit = shown_unit(row["unit"], [row[k][end] for k in ("first", "second") for end in ENDS])
         rows.append(
             [
                 f"{indicator_words(name)} [{unit or '–'}]",
@@ -139,7 +146,7 @@ def _table(pair, condition, names, usable):
                 row["verdict"],
             ]
         )
-    columns = ["Indicator", free(pair["first"], 24), free(pair["second"], 24), "Ratio", "P", "Verdict"]
+    columns = ["Indicator", free(shortened(pair["first"])), free(shortened(pair["second"])), "Ratio", "P", "Verdict"]
     return Table(columns, rows, [4.0, 3.16, 3.16, 3.62, 1.3, 1.76])
 
 
@@ -156,17 +163,25 @@ def _refused(result):
         for p in result["pairs"]
         for r in p["refused"]
     ]
+    rows += [
+        [free(p["first"], 40), f"{indicator_words(name)} at {loop_words(c)}", free(p["second"], 40), sentence(reason)]
+        for p in result["pairs"]
+        for c in p["conditions"]
+        for name, reason in (c.get("not_compared") or {}).items()
+    ]
     if not rows:
         return []
     return [
         Heading("Not compared"),
         Paragraph("An amplitude within the measured one can be predicted, a rate that was not measured cannot."),
-        Table(["Unit", "Loop", "against", "Reason"], rows, [0.9, 1.2, 0.9, 2.4]),
+        Table(["Unit", "Loop or indicator", "against", "Reason"], rows, [0.9, 1.2, 0.9, 2.4]),
     ]
 
 
 def _reproduction(result):
     fits = zip(result["names"], result["reproduction"], strict=True)
-    rows = [f"{free(n, 24)}: seed {f.get('seed', '–')}, data SHA-256 {digests(f.get('data_sha256') or '–')}" for n, f in fits]
+    rows = [
+        f"{free(shortened(n))}: seed {f.get('seed', '–')}, data SHA-256 {digests(f.get('data_sha256') or '–')}" for n, f in fits
+    ]
     versions = sorted({str(f["versions"]) for f in result["reproduction"] if "versions" in f})
     return [Note(f"Reproduction. {'; '.join([*rows, *versions])}. All conditions and indicators are in comparison.json.")]

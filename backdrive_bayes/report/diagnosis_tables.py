@@ -14,6 +14,7 @@ from backdrive_bayes.figures.diagnosis_words import (
 from backdrive_bayes.figures.style import shown_unit
 from backdrive_bayes.number_text import (
     ARCMIN_PER_RAD,
+    ENDS,
     decimals,
     fixed,
     interval_text,
@@ -77,7 +78,7 @@ def effect_parameters(saved: Diagnosed) -> list:
 
 
 def _parameter(saved, name, about):
-    factor, unit = shown_unit(about.get("unit", ""), [about["median"]])
+    factor, unit = shown_unit(about.get("unit", ""), [about[k] for k in ENDS])
     return [free(parameter_words(saved, name), 60), interval_text(about, factor), free(unit or "–", 20)]
 
 
@@ -135,7 +136,7 @@ def parameter_shift(saved: Diagnosed) -> list:
     """The baseline's parameters that move by a standard deviation or more, largest shift first."""
     lines = []
     for shift in [s for s in saved.shifts if abs(s["shift_sd"] or 0.0) >= MOVED][:MOST_PARAMETERS]:
-        factor, unit = shown_unit(shift["unit"], [shift[k]["median"] for k in ("before", "after")])
+        factor, unit = shown_unit(shift["unit"], [shift[k][end] for k in ("before", "after") if shift[k] for end in ENDS])
         intervals = (interval_text(shift[k], factor) for k in ("before", "after"))
         lines.append(
             [free(parameter_words(saved, shift["parameter"]), 60), free(unit or "–", 20), *intervals, signed(shift["shift_sd"])]

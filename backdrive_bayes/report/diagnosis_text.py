@@ -36,9 +36,10 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
     where = free(saved.summary, 400)
     if saved.simulator:
         return _against_simulator(saved, where)
-    if not saved.effects:
-        return "good", "NO GAP", Free(_join(answer_words(saved), where, _rivals(saved)))
     rivals = _rivals(saved)
+    if not saved.effects:
+        title = ("caution", "NO GAP FOUND, NOT RULED OUT") if rivals else ("good", "NO GAP")
+        return *title, Free(_join(answer_words(saved), rivals))
     found = "GAP FOUND" if "none" not in saved.credible_set else "GAP PROBABLE"
     text = Free(_join(answer_words(saved), more_words(saved), where, rivals, _closed(saved)))
     if saved.effects == ["unknown"]:
@@ -59,12 +60,13 @@ def _against_simulator(saved, where):
 
 def outcome(saved: Diagnosed) -> str:
     """One line for an overview."""
-    if saved.inconclusive or not saved.effects:
+    if saved.inconclusive:
         return answer_words(saved)
-    closed = saved.shrink.get("closed_fraction")
-    share = f"; closes {share_text(closed)} of the gap on held-out data" if closed and saved.effects != ["unknown"] else ""
+    closed, named = saved.shrink.get("closed_fraction"), saved.effects and saved.effects != ["unknown"]
+    share = f"; closes {share_text(closed)} of the gap on held-out data" if closed and named else ""
     rivals = len(saved.credible_set) - 1
-    return f"{answer_words(saved)}{share}{f'; {rivals} rivals in the 90 % set' if rivals > 0 else ''}"
+    more = f"; {rivals} rival{'s'[: rivals > 1]} in the 90 % set" if rivals > 0 else ""
+    return f"{answer_words(saved)}{share}{more}"
 
 
 def _standing(saved, rivals):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from backdrive_bayes.figures.catalogue import caption, figures_of
 from backdrive_bayes.figures.saved import Saved
-from backdrive_bayes.figures.style import PER_FIGURE, record_labels, words
-from backdrive_bayes.number_text import fixed, level_text
+from backdrive_bayes.figures.style import PER_FIGURE, loop_words, record_labels, words
+from backdrive_bayes.number_text import fixed, level_text, plain
 from backdrive_bayes.report import fit_tables as tables
 from backdrive_bayes.report.blocks import (
     About,
@@ -84,7 +84,8 @@ def _about(saved) -> About:
     told = [(k, str(identity[k])) for k in ON_OVERVIEW if identity.get(k)]
     provisional, forced = not usable(saved.indicators), bool(saved.indicators.get("forced"))
     rows = [(n, unit, tables.indicator_text(key, record, factor, provisional)) for key, n, unit, factor in tables.INDICATORS]
-    loop = f"{record['loading_rate_Nm_per_s']:.2g} N·m/s, ±{record['amplitude_Nm']:.2g} N·m"
+    options = f"k {plain(saved.indicators['k'])}, {level_text(saved.indicators['level'])} intervals"
+    loop = f"{loop_words(record)}, {options}"
     return About(str(saved.indicators["unit"]), told, loop, rows, ",".join(saved.indicators["data_sha256"]), provisional, forced)
 
 

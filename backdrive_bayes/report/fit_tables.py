@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import MJ_PER_J, PER_FIGURE, parts, record_labels, shown_unit, words
-from backdrive_bayes.number_text import ARCMIN_PER_RAD, fixed, interval_text, level_text, marked, significant
+from backdrive_bayes.number_text import ARCMIN_PER_RAD, ENDS, fixed, interval_text, level_text, marked, significant
 from backdrive_bayes.report.blocks import Note, Table
 from backdrive_bayes.report.findings import FORCED, PROVISIONAL
 from backdrive_bayes.report.text import free
@@ -75,7 +75,7 @@ def mechanism(saved) -> list:
 def ranges(saved) -> list:
     """Bounds of the ranges W1, W2 and W3, and what a load turns and stores."""
     found = [r["torque_energy"].get(key) for r in saved.records for key in _HUMP]
-    factor, unit = shown_unit("N·m", [f["median"] for f in found if f])
+    factor, unit = shown_unit("N·m", [f[k] for f in found if f for k in ENDS])
 
     def cells(r):
         b = r["back_drive"]

@@ -8,7 +8,7 @@ from backdrive_bayes.figures.fleet import CAPTIONS, chart_unit, fleet_figures, o
 from backdrive_bayes.figures.style import in_words, indicator_words, words
 from backdrive_bayes.number_text import probability_text, significant
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Links, Note, Paragraph, Picture, Table
-from backdrive_bayes.report.text import free
+from backdrive_bayes.report.text import Address, free
 from backdrive_bayes.results import FLEET, read_result
 
 TITLE = "Fleet"
@@ -102,7 +102,7 @@ def _drift(drift):
 def _worst(result):
     if result["worst"]:
         yield Heading("Units to look at")
-        yield Links([(row["unit"], row["result"], free(in_words(row["why"]), 120)) for row in result["worst"]])
+        yield Links([(row["unit"], Address(row["result"]), free(in_words(row["why"]), 120)) for row in result["worst"]])
         yield Note("A unit's name leads to its result file, in the fleet's folder.")
 
 

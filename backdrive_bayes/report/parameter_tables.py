@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backdrive_bayes.figures.style import shown_unit, words
-from backdrive_bayes.number_text import interval_text, level_text
+from backdrive_bayes.number_text import ENDS, interval_text, level_text
 from backdrive_bayes.report.blocks import Table
 from backdrive_bayes.report.text import free
 
@@ -12,7 +12,7 @@ def parameters(saved) -> list:
     """A table of the parameters."""
     rows = []
     for name, about in saved.indicators["parameters"].items():
-        factor, unit = shown_unit(about["unit"], [about["median"]])
+        factor, unit = shown_unit(about["unit"], [about[k] for k in ENDS])
         shown = [interval_text(about[k] if k else about, factor) for k in (None, "prior_interval")]
         rows.append([free(words(name)), shown[0], unit or "–", shown[1]])
     level = level_text(saved.indicators["level"])

@@ -13,7 +13,7 @@ from backdrive_bayes.errors import MissingExtra
 from backdrive_bayes.report.company import CompanyTemplate
 from backdrive_bayes.report.dress import dressed
 from backdrive_bayes.report.logo import refuse_undrawable
-from backdrive_bayes.report.text import Free, every_string, free, map_strings, printable, typeset
+from backdrive_bayes.report.text import Address, Free, every_string, free, map_strings, printable, typeset
 
 STANDARD = "ua-1"
 """PDF/UA-1: tagged, titled, with alternative texts. (PDF/A would force a creation date into the file.)"""
@@ -43,7 +43,6 @@ def compile_report(folders: list[Path], template: CompanyTemplate | None = None,
     """What Typst makes of the report with the given output options (bytes, or a list of bytes for images)."""
     typst = _typst()
     from backdrive_bayes.report.sections import chapters
-    from backdrive_bayes.report.written import written_on
 
     if template and template.logo:
         refuse_undrawable(template.logo, typst)
@@ -51,7 +50,7 @@ def compile_report(folders: list[Path], template: CompanyTemplate | None = None,
     with tempfile.TemporaryDirectory() as name:
         room = Path(name)
         title = template.title if template and template.title else TITLE
-        data = _data(found, room, title, written_on(folders))
+        data = _data(found, room, title)
         data, fonts = _fit_to_fonts(dressed(data, template, room) if template else data, typst)
         (room / "data.json").write_text(json.dumps(data), encoding="utf-8")
         for layout in _LAYOUT:
@@ -68,7 +67,7 @@ def _typst():
     return typst
 
 
-def _data(found, room: Path, title: str, written: str) -> dict:
+def _data(found, room: Path, title: str) -> dict:
     """Everything that the template prints; figures are written into ``room``."""
     from backdrive_bayes.report.blocks import Heading
     from backdrive_bayes.report.method_text import method_blocks
@@ -89,7 +88,7 @@ def _data(found, room: Path, title: str, written: str) -> dict:
         "title": full,
         "running": free(full, 90),
         "author": f"backdrive-bayes {version('backdrive-bayes')}",
-        "overview": [b.data() for b in overview_blocks(found, title, written)] if len(found) > 1 else [],
+        "overview": [b.data() for b in overview_blocks(found, title)] if len(found) > 1 else [],
         "chapters": [placed(c, i) for i, c in enumerate(found)],
         "method": [b.data() for b in method_blocks(_by_heading([b for c in found for b in c.terms]))],
     }
@@ -114,7 +113,7 @@ def _placed(block, chapter, i, room):
         return block
     path = room / f"{i}-{block['name']}.svg"
     save_svg(chapter.figures[block["name"]], path)
-    return block | {"file": path.name}
+    return block | {"file": Address(path.name)}
 
 
 def _fit_to_fonts(data, typst):
@@ -134,5 +133,7 @@ def _fit_to_fonts(data, typst):
 
 
 def _line(text, missing):
+    if isinstance(text, Address):
+        return text
     shown = printable(text, missing)
     return shown if isinstance(text, Free) else typeset(shown)

@@ -7,7 +7,7 @@ import unicodedata
 
 LONGEST = 240
 DIGITS = 12
-UNBREAKABLE = 36
+UNBREAKABLE, PIECE = 16, 12
 BREAK = "\u200b"
 LOW, END = "\ue000", "\ue001"
 """Marks around an index; free text cannot hold them, because :func:`printable` spells them out."""
@@ -25,6 +25,10 @@ def printable(text: str, missing: frozenset[str] = frozenset()) -> str:
 
 class Free(str):
     """Text that somebody else wrote: printed letter by letter, never typeset."""
+
+
+class Address(str):
+    """A file's name, which stays as it is."""
 
 
 def free(text, longest: int = LONGEST) -> Free:
@@ -61,12 +65,13 @@ def _spelt(character):
 
 
 def _breakable(found):
-    word, step = found[0], UNBREAKABLE // 2
+    word = found[0]
     # A digest fits its line, and a break inside it would be copied along with it.
     if _DIGEST.fullmatch(word.rstrip(".,;")):
         return word
-    pieces = re.split(r"(?<=[(),;=/])|(?<=\.)(?=\D)", word)
-    return BREAK.join(p[i : i + step] for p in pieces for i in range(0, len(p), step))
+    pieces = re.split(r"(?<=[(),;=/}])|(?<=\.)(?=\D)", word)
+    pieces = [p for piece in pieces for p in (re.split(r"(?<=[-_])", piece) if len(piece) > PIECE else [piece])]
+    return BREAK.join(p[i : i + PIECE] for p in pieces for i in range(0, len(p), PIECE))
 
 
 def every_string(data) -> list[str]:

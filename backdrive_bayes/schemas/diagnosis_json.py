@@ -113,7 +113,7 @@ class ParameterShift(Struct):
 
 
 class Residual(Struct):
-    """Residuals of a record over the torque."""
+    """Residuals of a record over the torque, the first loading left out."""
 
     record: Text
     torque_Nm: Curve

@@ -13,7 +13,8 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.figures import catalogue
 from backdrive_bayes.figures.diagnosis import figures_of
 from backdrive_bayes.figures.diagnosis_saved import Diagnosed
-from backdrive_bayes.figures.diagnosis_words import answer_words, chance, drawable
+from backdrive_bayes.figures.diagnosis_words import answer_words, chance
+from backdrive_bayes.figures.fonts import drawable
 from backdrive_bayes.figures.style import styled
 from backdrive_bayes.number_text import share_text
 

@@ -50,6 +50,15 @@ def test_few_steps_are_said_not_to_have_converged(twice):
     assert twice[0].json["convergence"]["converged"] is False
 
 
+def test_residuals_are_of_what_is_fitted_about_their_mean(twice):
+    """With the first loading, which is not fitted, all others lay beside zero."""
+    posterior = twice[0].posterior
+    for row, blocks in zip(twice[0].json["residual"], posterior.records.blocks, strict=True):
+        assert len(row["torque_Nm"]) == len(row["before_rad"]) == np.count_nonzero(blocks.leg > 0) < blocks.count.size
+        for key in ("before_rad", "after_rad"):
+            assert abs(np.mean(row[key])) < 1e-9
+
+
 def test_everything_is_plain_numbers(twice):
     text = json.dumps(twice[0].json, allow_nan=False)
     assert len(text) > 5000

@@ -9,6 +9,7 @@ from support.pdf import Pages
 from support_results import write_result
 
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.figures.diagnosis_saved import Diagnosed
 from backdrive_bayes.number_text import interval_text, probability_text, significant
 from backdrive_bayes.report import diagnosis_text, report
 
@@ -100,6 +101,18 @@ def test_a_gap_that_is_not_there(tmp_path):
     pages = pages_of(tmp_path)
     assert "NO GAP" in pages[0] and "baseline explains the data (97 %)" in pages[0] and "Not ruled out" not in pages[0]
     assert not any("How far it shrinks" in p or "Next test" in p or "What it changes" in p for p in pages)
+
+
+def test_no_gap_with_rivals_is_not_called_green(tmp_path):
+    """Where the credible set holds causes there is no green light, and no place of a gap that is not said to be there."""
+    which = [{"effect": "none", "probability": 0.73}, {"effect": "viscoelastic_creep", "probability": 0.27}]
+    answer = {"effects": [], "credible_set_90": ["none", "viscoelastic_creep"]}
+    result = write_diagnosis(tmp_path, answer=answer, which=which, shrink=None, next_test=None)
+    page = pages_of(tmp_path)[0]
+    assert "NO GAP FOUND, NOT RULED OUT" in page and "Not ruled out at 90 %: viscoelastic creep" in page
+    tone, _, text = diagnosis_text.verdict(Diagnosed(result))
+    assert tone == "caution" and result["where"]["summary"][:20] not in text
+    assert "1 rival in the 90 % set" in diagnosis_text.outcome(Diagnosed(result))
 
 
 def test_a_name_that_closes_nothing_is_said_to_predict_nothing(tmp_path):

@@ -1,6 +1,7 @@
 """The PDF holds the numbers of the JSON, prints free text as it stands and is the same bytes again."""
 
 import json
+import os
 import re
 
 import pytest
@@ -8,6 +9,7 @@ from support.pdf import Pages
 from support_results import GROUP_ATTRIBUTES, indicators, write_result
 
 from backdrive_bayes.errors import BadInput, MissingExtra
+from backdrive_bayes.figures.style import loop_words, shown_unit
 from backdrive_bayes.number_text import interval_text, significant, with_error
 from backdrive_bayes.report import fit_section, report
 from backdrive_bayes.report.blocks import Note, Picture, Table
@@ -164,7 +166,7 @@ def test_provisional_numbers_are_marked_beside_good_ones(tmp_path):
     write_result(unconverged, records=1, unit="unconverged", convergence=bad, data_sha256=["1" * 64])
     write_result(forced, records=1, unit="forced", forced=True, data_sha256=["2" * 64])
     abouts = [fit_section.chapter(folder).about for folder in (good, unconverged, forced)]
-    blocks = overview_blocks([fit_section.chapter(folder) for folder in (good, unconverged, forced)], "Report", "today")
+    blocks = overview_blocks([fit_section.chapter(folder) for folder in (good, unconverged, forced)], "Report")
     plain, marked = (interval_text(entry, ARCMIN).replace(" [", f"{mark} [") for mark in ("", "?"))
     table = next(b for b in blocks if isinstance(b, Table) and b.columns[0] == "Indicator")
     assert [plain, marked, marked] in [row[2:] for row in table.rows]
@@ -282,4 +284,43 @@ def test_numbers_in_words():
     assert typeset("R1.S_g_over_S; sensitivity('W_L_J')") == "R1.S_g_over_S; sensitivity('W_L_J')"
     assert printable("largest(R2.loop_area_J(amplitude=0.04))").split("\u200b")[:3] == ["largest(", "R2.", "loop_area_J("]
     assert "0.04" in printable("largest(R2.loop_area_J(amplitude=0.04))")
+    broken = printable("RV-110E-127_SN20261128-0047")
+    assert max(map(len, broken.split("\u200b"))) <= 12 and broken.replace("\u200b", "") == "RV-110E-127_SN20261128-0047"
     assert printable("f" * 64) == "f" * 64 and "\u200b" in printable("x" * 64)
+
+
+@pytest.mark.parametrize("rows", range(7))
+def test_the_main_figure_stands_once_however_long_the_facts_are(rows, tmp_path):
+    """Measured among the smaller tables of the details, the fault that was there, the summary had room for a picture that it did
+    not bear, which was then printed nowhere."""
+    identity = {f"fact {i}": "x" for i in range(rows)}
+    write_result(tmp_path, records=4, identity=identity)
+    text = Pages(report.report_bytes([tmp_path])).text
+    assert text.count("Measured angle against torque") == 1
+
+
+def test_settings_are_told_without_powers_of_ten():
+    at = {"loading_rate_Nm_per_s": 104.0, "amplitude_Nm": 1040.0}
+    assert loop_words(at) == "104 N·m/s, ±1040 N·m" and loop_words(dict.fromkeys(at, 0.05)) == "0.05 N·m/s, ±0.05 N·m"
+    assert shown_unit("N·m", [0.0, 0.0, 67.01]) == (1.0, "N·m") and shown_unit("N·m", [0.01, 0.0, 0.02]) == (1e3, "mN·m")
+
+
+def test_each_fit_has_a_column_with_its_k_and_level(tmp_path):
+    """Two fits of the same data: the second had taken the place of the first."""
+    for name, k in (("a", 0.03), ("b", 0.2), ("c", 0.03), ("d", 0.03)):
+        write_result(tmp_path / name, records=1, unit="same" if name < "c" else name, k=k)
+    blocks = overview_blocks([fit_section.chapter(tmp_path / name) for name in "abcd"], "Report")
+    table = next(b for b in blocks if isinstance(b, Table) and b.columns[0] == "Indicator")
+    assert table.columns[2:] == ["same", "same", "c"]
+    note = next(b.text for b in blocks if isinstance(b, Note) and "settled loop" in b.text)
+    assert "k 0.03, 90 % intervals" in note and "k 0.2, 90 % intervals" in note and "Of 1 further fit see" in note
+
+
+def test_a_copied_folder_gives_the_same_report(tmp_path):
+    """Nothing depends on when a file was written: "Results of" was the day of the copy."""
+    for name, day in (("a", 1e9), ("b", 1.7e9)):
+        write_result(tmp_path / name / "r", records=1)
+        for path in (tmp_path / name / "r").iterdir():
+            os.utime(path, (day, day))
+    both = [[tmp_path / name / "r", tmp_path / name / "r"] for name in "ab"]
+    assert report.report_bytes(both[0]) == report.report_bytes(both[1])
