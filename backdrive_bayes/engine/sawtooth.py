@@ -19,6 +19,8 @@ SPREAD = 0.25
 STRAY = 1e-3
 """Share of instants at which something else moves the angle either way, by up to ``FAR`` noise standard deviations."""
 FAR = 6.0
+APART = 64
+"""Room between the rows of an array that compiled loops go through at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +111,15 @@ def _bell(start, step, out):
 
 
 @numba.njit(cache=True, fastmath=True)
-def _toothed(value, fresh, memory, sd, height, length, holds):
-    first, runs = np.ones(holds.size), 1.0
-    for k in range(1, holds.size):
+def _toothed(value, fresh, memory, sd, height, length, given):
+    # Rows of one array: how near to one another arrays of their own happen to lie decides in which order loops add.
+    rows, size = np.zeros((6, given.size + APART)), given.size
+    first, now, then, on, back, holds = rows[0, :size], rows[1, :size], rows[2, :size], rows[3, :size], rows[4, :size], rows[5, :size]
+    holds[:], first[0], runs = given, 1.0, 1.0
+    for k in range(1, size):
         first[k] = first[k - 1] * holds[k - 1]
         runs += first[k]
-    now, then, on, back = first / runs, np.zeros(holds.size), np.empty(holds.size), np.empty(holds.size)
+    now[:] = first / runs
     found, known, stray, fall = 0.0, (1.0 - STRAY) / sd, STRAY / FAR, height / length
     for t in range(1, value.size):
         if fresh[t]:
