@@ -199,9 +199,9 @@ def diagnose(unit, *, simulated=None, k=0.03, level=0.9, seed: int = 0, baseline
     """
     modules = FitOptions.baseline if baseline is None else tuple(baseline)
     options, ready = FitOptions(modules, k, level, seed), _ready(unit, k, force)
-    other = None if simulated is None else _ready(simulated, k, force).unit
-    result, sampled = diagnose_unit(ready.unit, options, progress or (lambda text: None), simulated=other)
-    return Diagnosis(ready.stamp(result), _fitted(ready, *sampled))
+    other = None if simulated is None else _ready(simulated, k, force)
+    result, sampled = diagnose_unit(ready.unit, options, progress or (lambda text: None), simulated=other and other.unit)
+    return Diagnosis(ready.beside(other).stamp(result), _fitted(ready, *sampled))
 
 
 def accept(fitted, limits, *, probabilities=None, batch=()) -> Verdict:

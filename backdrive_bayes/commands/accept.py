@@ -18,6 +18,7 @@ from backdrive_bayes.commands.results import (
     keep_fit,
     keep_run,
     refuse_company,
+    require_fitted_with,
     retire,
     stamped_by,
 )
@@ -59,6 +60,7 @@ def run(args) -> int:
     with progress(*ACCEPT) as note:
         if is_result(args.unit):
             made, evidence, out = None, Evidence.read(args.unit), args.out or args.unit
+            require_fitted_with(options, evidence.about)
             repeat_findings(evidence.name, evidence.about)
         else:
             made, evidence, out = _fit(args, limits, options, note)
@@ -97,7 +99,10 @@ def _fit(args, limits, options, note):
     facts = record_facts(reduce_unit(unit))
     for limit in limits.limits:
         limited_loops(limit, measured_loops(facts.rate_nm_per_s, facts.amplitude_nm))
-    options = replace(options, k=limits.only_k(args.limits) or options.k)
+    k = limits.only_k(args.limits) or options.k
+    if options.k not in (FitOptions.k, k):
+        raise BadInput("--k", f"{k:g} as in {args.limits.name}", options.k)
+    options = replace(options, k=k)
     posterior, result = fit_unit(unit, options, note)
     # What acts beside the model would shift every number that is judged.
     diagnosis, _ = diagnose_unit(unit, options, note, sample=False)

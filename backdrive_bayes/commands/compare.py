@@ -16,6 +16,7 @@ from backdrive_bayes.commands.results import (
     keep_decision,
     keep_fit,
     keep_run,
+    require_fitted_with,
     stamped_by,
 )
 from backdrive_bayes.commands.stages import FIT
@@ -53,7 +54,7 @@ def run(args) -> int:
     evidences, made = _evidences(args, options)
     result = compare(evidences, claims, args.rope, args.level, args.seed)
     result |= collected([e.about for e in evidences])
-    stamped_by(result, evidences, args.seed, rope=args.rope, claims=Path(args.claims or "").name)
+    stamped_by(result, evidences, args.seed, level=args.level, rope=args.rope, claims=Path(args.claims or "").name)
     out = args.out or default_out("-".join(result["names"][:3]), "compare")
     with progress() as note, write_folder(out) as folder:
         for name, (posterior, own) in made.items():
@@ -76,6 +77,7 @@ def _evidences(args, options):
     evidences, made = [], {}
     for ready in units:
         if isinstance(ready, Evidence):
+            require_fitted_with(options, ready.about, ("baseline", "k"))
             repeat_findings(ready.name, ready.about)
             evidences.append(ready)
             continue
@@ -90,12 +92,13 @@ def _evidences(args, options):
 
 
 def _require_own_records(paths, units) -> None:
-    """BadInput where two results or units are of the same records: their draws are not independent."""
+    """BadInput where two results or units have a record in common: their draws are not independent."""
     hashes = [u.unit.data_sha256 if hasattr(u, "unit") else u.about["data_sha256"] for u in units]
     seen: dict = {}
     for path, own in zip(paths, hashes, strict=True):
-        if (first := seen.setdefault(tuple(sorted(own)), path)) is not path:
-            raise BadInput("compare", "units of different records", f"the same records in '{first}' and '{path}'")
+        for digest in own:
+            if (first := seen.setdefault(digest, path)) is not path:
+                raise BadInput("compare", "units of different records", f"the same records in '{first}' and '{path}'")
 
 
 def _summarise(result: dict, out: Path) -> None:

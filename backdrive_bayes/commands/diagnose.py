@@ -34,7 +34,7 @@ def add_arguments(parser) -> None:
     what = "what a simulator answered to the same or other torque paths: say what it lacks, and what re-tuning it would close"
     parser.add_argument("--simulated", type=Path, metavar="SIM_UNIT", help=what)
     add_fit_arguments(parser)
-    parser.add_argument("--no-posterior", action="store_true", help="write diagnosis.json only")
+    parser.add_argument("--no-posterior", action="store_true", help="write no posterior.nc and no indicators.json")
 
 
 def run(args) -> int:
@@ -42,12 +42,13 @@ def run(args) -> int:
     began, options = time.perf_counter(), FitOptions.of(args)
     ready = ready_unit(args.unit, options.k, getattr(args, "force", False))
     unit = ready.unit
-    simulated = ready_unit(args.simulated, options.k, getattr(args, "force", False)).unit if args.simulated else None
+    simulator = ready_unit(args.simulated, options.k, getattr(args, "force", False)) if args.simulated else None
+    simulated = simulator.unit if simulator else None
     out = args.out or default_out(unit.name, "diagnose")
     require_out(out)
     with progress(*(DIAGNOSE_SIMULATED if simulated else DIAGNOSE)) as note:
         result, sampled = diagnose_unit(unit, options, note, not args.no_posterior, simulated)
-    ready.stamp(result)
+    ready.beside(simulator).stamp(result)
     if sampled is None:
         refuse_company(out, result)
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,14 @@ class ReadyUnit:
         result["findings"], result["forced"] = self.checked["findings"], self.forced
         result["outcome"] = outcome_of(result).to_json()
         return result
+
+    def beside(self, other: ReadyUnit | None) -> ReadyUnit:
+        """The same with what is said of another unit that a result rests on as well."""
+        if other is None:
+            return self
+        theirs = [row | {"record": f"{other.unit.name}: {row['record'] or 'all'}"} for row in other.checked["findings"]]
+        checked = self.checked | {"findings": [*self.checked["findings"], *theirs]}
+        return replace(self, checked=checked, forced=self.forced or other.forced)
 
     @property
     def lines(self) -> list[str]:

@@ -35,7 +35,7 @@ def add_arguments(parser) -> None:
 
 
 def run(args) -> int:
-    """Write a result file a unit, fleet.parquet, fleet.json and figures; 0 done, 4 where a unit has no result."""
+    """Write a result file a unit, two tables, fleet.json and figures; 0 done, 4 where a unit has no result."""
     from backdrive_bayes.commands.fleet_pool import show_pools
     from backdrive_bayes.fleet import cluster, store, summary, table
     from backdrive_bayes.fleet.run import run_fleet
@@ -132,4 +132,4 @@ def _summarise(result: dict, tally, out: Path) -> None:
         if chart["drift"] and chart["drift"]["alarm"]:
             say(f"  drift of {chart['indicator']} from about {chart['drift']['first']} on "
                 f"(by chance {chart['drift']['probability']:.2g})")  # fmt: skip
-    say(f"written to {out}/fleet.parquet and {NAME}")
+    say(f"written to {out}/fleet.parquet, records.parquet and {NAME}")

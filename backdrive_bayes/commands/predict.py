@@ -89,4 +89,6 @@ def _write(path, header, time, torque, at, curves) -> None:
 
     every = np.arange(time.size)
     columns = np.column_stack([time, torque, *(np.interp(every, at, curve) for curve in curves)])
-    np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt="%.9g")
+    # Stamps of a clock have more digits than what is predicted.
+    digits = ["%.15g", *["%.9g"] * (columns.shape[1] - 1)]
+    np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt=digits)

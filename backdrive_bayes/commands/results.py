@@ -68,6 +68,17 @@ class FitOptions:
         return {"baseline": list(self.baseline), "k": self.k, "level": self.level, **loads}
 
 
+def require_fitted_with(options: FitOptions, about: dict, names=("baseline", "k", "level", "seed")) -> None:
+    """BadInput where an option was given that a former fit, whose indicators object is ``about``, was made without."""
+    fitted = {"baseline": tuple(about["model"]["modules"]), "k": about["k"], "level": about["level"], "seed": about["seed"]}
+    for name in names:
+        given, usual = getattr(options, name), getattr(FitOptions, name)
+        alike = [sorted(v) if name == "baseline" else v for v in (given, usual, fitted[name])]
+        if alike[0] not in alike[1:]:
+            shown = [",".join(v) if name == "baseline" else f"{v:g}" for v in (fitted[name], given)]
+            raise BadInput(f"--{name}", f"{shown[0]}, with which '{about['unit']}' was fitted", shown[1])
+
+
 def add_fit_arguments(parser) -> None:
     """The options of every verb that may fit."""
     modules = "modules of the model, comma-separated, out of %(default)s (default: all)"
@@ -97,7 +108,7 @@ def fit_unit(unit, options: FitOptions, note=lambda text: None, posterior=None):
     require_loads(unit.rated_torque_nm, options.loads)
     posterior = as_saved(posterior or fit_posterior(unit, options.baseline, options.seed, note))
     note("indicators and their intervals")
-    posterior = examined(IndicatorDraws(posterior, options.k), unit, options.level)
+    posterior = examined(IndicatorDraws(posterior, options.k), unit)
     result = indicators_json(IndicatorDraws(posterior, options.k), options.level)
     if options.loads:
         result["loads"] = loads_json(posterior, options.loads, options.load_rate, options.level)
@@ -159,7 +170,7 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
     about = options.to_json() | ({"simulated": simulated.name} if simulated else {})
     if not sample:
         drawn = IndicatorDraws(as_saved(found.posterior), options.k)
-        found.json["convergence"] = convergence_json(examined(drawn, unit, options.level))
+        found.json["convergence"] = convergence_json(examined(drawn, unit))
         return stamped(found.json, origin(unit), options.seed, about), None
     sampled = fit_unit(unit, options, note, found.posterior)
     found.json["convergence"] = sampled[1]["convergence"]

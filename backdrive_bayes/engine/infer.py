@@ -44,12 +44,14 @@ def prepare(unit: Unit, modules=BASELINE, note: Callable[[str], None] = lambda t
 
 
 @one_thread()
-def infer(linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=lambda text: None) -> Posterior:
+def infer(
+    linear: Linear, hypothesis: tuple[str, ...] = (), seed: int = 0, note=lambda text: None, off: tuple[str, ...] = ()
+) -> Posterior:
     """Posterior of a unit.
 
-    ``hypothesis`` names effects that are present while all others stay at trace level.
+    ``hypothesis`` names effects that are present while all others stay at trace level, ``off`` modules that the class lacks.
     """
-    scales, mode, solution = learn_scales(linear, levels(linear, hypothesis))
+    scales, mode, solution = learn_scales(linear, levels(linear, hypothesis, off))
     drawn = sample(linear.data, scales, mode, linear.design.names, seed, note, POWERS)
     reduced, names = linear.reduced, linear.design.names
     weights = np.split(drawn.weights, np.cumsum([g.width for g in linear.design.groups])[:-1], axis=-1)

@@ -20,8 +20,8 @@ PRESENT_SD = 1.0
 
 def levels(linear: Linear, hypothesis: tuple[str, ...], off: tuple[str, ...] = ()) -> dict[str, tuple[float, float]]:
     """Mean and standard deviation of each group's log scale: effects of the hypothesis are free, or as large as is known, those
-    that are ``off`` leave not even a trace, all others are at trace level."""
-    priors = class_priors(linear.reducer)
+    that are ``off`` leave not even a trace, all others are at trace level. A module of the class that is off has no parts."""
+    priors = class_priors(linear.reducer) | {p.name: OFF for p in linear.reducer.parts if p.module in off}
     present, gone = ({t.name for n in names for t in all_effects().get(n, ())} for names in (hypothesis, off))
     traces = trace_levels(linear.reduced, linear.design, linear.effects)
     for effect in (e for e in linear.effects if e.name in traces):

@@ -222,7 +222,9 @@ class _Target:
 
 
 def _laplace_root(target, mode) -> np.ndarray:
-    """Cholesky factor of the inverse Hessian at the mode, kept within the prior's width."""
+    """Cholesky factor of the inverse Hessian at the mode, or as near to it as differences stay within the range of log scales,
+    kept within the prior's width."""
+    mode = np.clip(mode, LOG_SCALES[0] + 2.0 * LAPLACE_STEP, LOG_SCALES[1] - 2.0 * LAPLACE_STEP)
     rows, columns = np.tril_indices(mode.size)
     unit, hessian = LAPLACE_STEP * np.eye(mode.size), np.empty((mode.size, mode.size))
     ends = [target(mode + a * unit[rows] + b * unit[columns]) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1))]

@@ -114,7 +114,8 @@ def _bell(start, step, out):
 def _toothed(value, fresh, memory, sd, height, length, given):
     # Rows of one array: how near to one another arrays of their own happen to lie decides in which order loops add.
     rows, size = np.zeros((6, given.size + APART)), given.size
-    first, now, then, on, back, holds = rows[0, :size], rows[1, :size], rows[2, :size], rows[3, :size], rows[4, :size], rows[5, :size]
+    first, now, then = rows[0, :size], rows[1, :size], rows[2, :size]
+    on, back, holds = rows[3, :size], rows[4, :size], rows[5, :size]
     holds[:], first[0], runs = given, 1.0, 1.0
     for k in range(1, size):
         first[k] = first[k - 1] * holds[k - 1]

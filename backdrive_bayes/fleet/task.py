@@ -82,6 +82,8 @@ def carry_out(job: Job, unit: FleetUnit) -> Done:
         # No fault of the unit's files, such as a reader that is not installed: it is tried once more.
         rows, error, stamp = [], _line(raised), stamp | {"files_sha256": None}
     status = FAILED if error else DONE
+    # Where a fleet lies is no part of its results.
+    error = error and error.replace(str(unit.path), unit.name)
     write_result(job.out, unit, stamp, status, error, rows)
     return Done(status, error, time.perf_counter() - began)
 

@@ -13,6 +13,7 @@ from backdrive_bayes.records.readers import record_suffix
 
 UNIT_FILE = "unit.toml"
 LOCK = ".fleet.lock"
+RESULTS = {"indicators.json", "diagnosis.json", "verdict.json", "comparison.json", "prediction.json", "check.json"}
 """Lies in a folder to which a fleet's table is written."""
 
 
@@ -65,7 +66,8 @@ def find_units(folder: Path, out: Path) -> list[FleetUnit]:
             continue
         found += [here / name for name in below if (here / name).is_symlink() and (here / name / UNIT_FILE).is_file()]
         below[:] = sorted(name for name in below if not name.startswith(".") and here / name != out)
-        if LOCK not in files:
+        # What the package itself wrote is no record.
+        if LOCK not in files and not RESULTS.intersection(files):
             found += [here / name for name in sorted(files) if not name.startswith(".") and record_suffix(here / name)]
     if not found:
         raise BadInput(folder, "a folder with units (unit.toml and record files) below it", "none")

@@ -54,13 +54,17 @@ def fit_posterior(unit: Unit, modules=BASELINE, seed: int = 0, note=lambda text:
     return mixed(drawn)
 
 
-def posterior_of(weighed: Weighed, effects: tuple[str, ...], seed: int, note=lambda text: None) -> Posterior:
-    """Posterior under one set of effects, in the linear model that weighed it; computed once for a seed."""
-    if (tuple(effects), seed) not in weighed.posteriors:
+def posterior_of(
+    weighed: Weighed, effects: tuple[str, ...], seed: int, note=lambda text: None, off: tuple[str, ...] = ()
+) -> Posterior:
+    """Posterior under one set of effects, without the modules that are ``off``, in the linear model that weighed it; computed
+    once for a seed."""
+    key = tuple(effects), seed, off
+    if key not in weighed.posteriors:
         listed = tuple(e for e in effects if e in all_effects())
-        found = replace(infer(with_columns(weighed, effects), listed, seed, note), hypothesis=tuple(effects))
-        weighed.posteriors[tuple(effects), seed] = found
-    return weighed.posteriors[tuple(effects), seed]
+        found = infer(with_columns(weighed, effects), listed, seed, note, off)
+        weighed.posteriors[key] = replace(found, hypothesis=tuple(effects))
+    return weighed.posteriors[key]
 
 
 def with_columns(weighed: Weighed, effects: tuple[str, ...]) -> Linear:

@@ -62,8 +62,8 @@ def _finish(found: Found, progress) -> Diagnosis:
     inconclusive = _why_inconclusive(found.unit)
     listed = tuple(e for e in effects if e in all_effects())
     progress("sampling the chosen model")
-    posterior = posterior_of(found.weighed, effects, found.seed, progress)
-    none = posterior_of(found.weighed, (), found.seed, progress) if effects else posterior
+    posterior = posterior_of(found.weighed, effects, found.seed, progress, found.lacking(effects))
+    none = posterior_of(found.weighed, (), found.seed, progress, found.lacking(())) if effects else posterior
     json = {
         "schema": DIAGNOSIS,
         "unit": found.unit.name,

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import expit
 
-from backdrive_bayes.engine.levels import OFF, levels
+from backdrive_bayes.engine.levels import levels
 from backdrive_bayes.engine.linear import Linear
 from backdrive_bayes.engine.one_thread import one_thread
 from backdrive_bayes.gap import where
@@ -96,7 +96,7 @@ class Found:
     @cached_property
     def gap(self) -> where.Gap:
         """What measurement and class leave between them."""
-        return where.estimate_gap(self.linear, self.rng)
+        return where.estimate_gap(self.linear, self.rng, tuple(self.withheld))
 
     @cached_property
     def fits(self) -> tuple[Fitted, Fitted]:
@@ -155,13 +155,11 @@ class Found:
         """A hypothesis in the linear model, with what is ``off`` not even a trace; what has no columns of its own stands for
         itself by those of the class."""
         linear = with_columns(self.weighed, effects)
-        priors = levels(linear, tuple(effects), off)
-        for module in self.withheld:
-            if module not in effects:
-                for part in linear.reducer.parts:
-                    if part.module == module:
-                        priors[part.name] = OFF
-        return fit_hypothesis(linear, effects, priors)
+        return fit_hypothesis(linear, effects, levels(linear, tuple(effects), (*off, *self.lacking(effects))))
+
+    def lacking(self, effects) -> tuple[str, ...]:
+        """Modules that the baseline was asked to do without and that are not among the effects."""
+        return tuple(module for module in self.withheld if module not in effects)
 
     def closed_of(self, folds=None) -> dict | None:
         """Closed fraction of one fold, several or all; None where only properties are named: the class holds them before and

@@ -36,15 +36,15 @@ class Gap:
         )
 
 
-def estimate_gap(linear: Linear, rng) -> Gap:
-    """The process along each leg beside the clean class, all effects at trace level; that of each record has a scale of its own,
-    or what one record has would be shared out among all."""
+def estimate_gap(linear: Linear, rng, off: tuple[str, ...] = ()) -> Gap:
+    """The process along each leg beside the clean class without the modules that are ``off``, all effects at trace level; that of
+    each record has a scale of its own, or what one record has would be shared out among all."""
     usual = UNKNOWN.present(linear.reduced.context)
     records = path_group(linear.reduced, UNKNOWN).by_record()
     beside = linear
     for record in records:
         beside = beside.beside(record, usual)
-    priors = levels(linear, ()) | {record.name: (float(np.log(usual)), 2.0) for record in records}
+    priors = levels(linear, (), off) | {record.name: (float(np.log(usual)), 2.0) for record in records}
     solution = learn_scales(beside, priors)[2]
     parts = beside.design.split(np.arange(solution.mean.size))
     noise = rng.standard_normal((solution.root.shape[1], 200)) * np.sqrt(solution.variance)

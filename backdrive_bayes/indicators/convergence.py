@@ -12,11 +12,12 @@ from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
 from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad
 from backdrive_bayes.indicators.intervals import ends
-from backdrive_bayes.indicators.loop import Loops
+from backdrive_bayes.indicators.loop import Loops, loop_grid, settled_loops
+from backdrive_bayes.indicators.same_loop import same_amplitude
 from backdrive_bayes.records.measured_loop import MeasuredLoop, measured_loops
 from backdrive_bayes.records.record import Unit
 
-STANDARD_ERRORS = 3.0
+LEVEL, STANDARD_ERRORS = 0.9, 3.0
 SHARE = {"settled": 0.05, "first": 0.3}
 """Share of a measured value by which the interval is widened; a cycle from rest is not the settled loop."""
 
@@ -34,7 +35,7 @@ CHECKED = (
 )
 
 
-def examined(draws: IndicatorDraws, unit: Unit | None = None, level: float = 0.9) -> Posterior:
+def examined(draws: IndicatorDraws, unit: Unit | None = None) -> Posterior:
     """The posterior with the indicators' diagnostics beside its own, and what the measured cycles of ``unit`` say against it."""
     posterior = draws.posterior
     names, columns = [], []
@@ -45,18 +46,17 @@ def examined(draws: IndicatorDraws, unit: Unit | None = None, level: float = 0.9
     values = np.stack(columns, axis=-1)
     order = np.broadcast_to(np.arange(values.shape[1]), values.shape[:2])
     own = diagnose_draws(names, values, order, posterior.convergence.evaluations)
-    doubts = () if unit is None else tuple(contradictions(draws, measured_loops(unit), level))
+    doubts = () if unit is None else tuple(contradictions(draws, measured_loops(unit)))
     return replace(posterior, convergence=posterior.convergence.joined(own), doubts=doubts)
 
 
-def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, ...], level: float) -> list[str]:
+def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, ...], level: float = LEVEL) -> list[str]:
     """One sentence for every measured number that the posterior's interval does not hold, with both numbers."""
     found = []
     for record, loop in enumerate(measured):
         if loop is None:
             continue
-        # At the torque that was reached, which may miss the declared amplitude.
-        loops = draws.loops(draws.rates[record], _reached(draws, record)).late(_lag_nm(draws, record))
+        loops = _reached(draws, record).late(_lag_nm(draws, record))
         for name, text, unit, function in CHECKED:
             value = getattr(loop, name)
             if value is None:
@@ -69,9 +69,14 @@ def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, .
     return found
 
 
-def _reached(draws, record) -> float:
-    """Amplitude [N·m] of the loop that was measured."""
-    return draws.posterior.records.blocks[record].amplitude_nm
+def _reached(draws, record) -> Loops:
+    """The loop between the torques that were reached, which may miss the declared amplitude and lie off centre."""
+    posterior, blocks, rate = draws.posterior, draws.posterior.records.blocks[record], draws.rates[record]
+    low, high = blocks.tips_nm
+    if same_amplitude(-low, high):
+        return draws.loops(rate, blocks.amplitude_nm)
+    grid = loop_grid(posterior, max(-low, high))
+    return settled_loops(posterior, np.r_[low, grid[(grid > low) & (grid < high)], high], rate)
 
 
 def _lag_nm(draws, record):

@@ -76,16 +76,16 @@ def loop_grid(posterior: Posterior, amplitude_nm: float, exact=()) -> np.ndarray
 
 
 def settled_history(torque, rate_nm_per_s: float, torque_scale_nm: float) -> History:
-    """From rest through one cycle of the amplitude of ``torque`` (points,), then down and up along it at that rate."""
-    top = torque[-1]
-    run_in = top * np.r_[0.0, np.linspace(0, 1, RUN_IN_POINTS)[1:], np.linspace(1, -1, 2 * RUN_IN_POINTS)[1:]]
-    whole = np.r_[run_in, np.linspace(-top, top, 2 * RUN_IN_POINTS)[1:], torque[::-1][1:], torque[1:]]
+    """From rest through one cycle between the ends of ``torque`` (points,), then down and up along it at that rate."""
+    low, top = torque[0], torque[-1]
+    run_in = np.r_[0.0, np.linspace(0, top, RUN_IN_POINTS)[1:], np.linspace(top, low, 2 * RUN_IN_POINTS)[1:]]
+    whole = np.r_[run_in, np.linspace(low, top, 2 * RUN_IN_POINTS)[1:], torque[::-1][1:], torque[1:]]
     time = np.r_[0.0, np.cumsum(np.abs(np.diff(whole)))] / rate_nm_per_s
     return through(time, whole, torque_scale_nm)
 
 
 def settled_loops(posterior: Posterior, torque, rate_nm_per_s: float, modules=None) -> Loops:
-    """The reducer's settled loops on ``torque`` (points,), odd-symmetric and rising; of some ``modules`` alone where given."""
+    """The reducer's settled loops on ``torque`` (points,), rising; of some ``modules`` alone where given."""
     angle = posterior.angles(settled_history(torque, rate_nm_per_s, posterior.context.torque_scale_nm), rate_nm_per_s, modules)
     return cut_loops(torque, angle)
 

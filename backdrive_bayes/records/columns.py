@@ -44,10 +44,11 @@ def read_channels(path: Path, kinds, asked: dict[str, str]) -> Channels:
     found: dict[str, tuple[str, Quantity]] = {}
 
     def choose(headers: tuple[str, ...]) -> list[str]:
-        found.update({kind: find_column(headers, kind, asked.get(kind), str(path)) for kind in kinds})
+        lone = "angle" not in kinds
+        found.update({kind: find_column(headers, kind, asked.get(kind), str(path), lone) for kind in kinds})
         chosen = [header for header, _ in found.values()]
         if len(set(chosen)) < len(chosen):
-            raise BadInput(path, "three different columns for time, torque and angle", ", ".join(chosen))
+            raise BadInput(path, f"different columns for {' and '.join(kinds)}", ", ".join(chosen))
         return chosen
 
     columns = read_columns(path, choose)
@@ -62,16 +63,17 @@ def read_channels(path: Path, kinds, asked: dict[str, str]) -> Channels:
     return Channels(values, columns.first_row, notes, {kind: spelling(*chosen) for kind, chosen in found.items()})
 
 
-def find_column(headers: tuple[str, ...], kind: str, asked: str | None, where: str) -> tuple[str, Quantity]:
+def find_column(headers: tuple[str, ...], kind: str, asked: str | None, where: str, lone: bool = False) -> tuple[str, Quantity]:
     """Find the header that holds a quantity, and the unit in which it is written.
 
     ``asked`` is the unit file's spelling, or None for the default column (then any header called time, torque
     or angle with a known unit will do, and after that a common name or a lone unit that leaves no choice). Brackets may
-    stand in the file, in ``asked``, or in both alike; a leading minus in ``asked`` turns the channel's sign.
+    stand in the file, in ``asked``, or in both alike; a leading minus in ``asked`` turns the channel's sign. A
+    ``lone`` file has no unit file to say it in.
     Raises BadInput for a missing or ambiguous column and for units that contradict each other.
     """
     if asked is None:
-        return _default_column(headers, kind, where)
+        return _default_column(headers, kind, where, lone)
     sign, name = _signed(asked)
     found = _matching(headers, name)
     if not found:
@@ -103,13 +105,13 @@ def _without_unit(headers, kind) -> str:
     return f"{name[:200]} [{_EXAMPLES[kind]}?]"
 
 
-def _default_column(headers, kind, where) -> tuple[str, Quantity]:
+def _default_column(headers, kind, where, lone) -> tuple[str, Quantity]:
     found = [h for h in headers if h == DEFAULT_COLUMNS[kind]] or [h for h in headers if _bare(h) == kind]
     plain = len(found) == 1 and _has_unit(found[0], kind) and not WORDED.match(found[0].strip())
     if plain or found == [DEFAULT_COLUMNS[kind]]:
         return found[0], parse_quantity(found[0], kind, where)
     guessed = found or _likely(headers, kind)
-    advice = f"; say which in {_UNIT_FILE}, under [[record]]: {columns_to_paste(headers)}"
+    advice = "" if lone else f"; say which in {_UNIT_FILE}, under [[record]]: {columns_to_paste(headers)}"
     if len(guessed) > 1:
         raise BadInput(where, f"one {kind} column '{DEFAULT_COLUMNS[kind]}'", f"{len(guessed)}: {_listed(guessed)}{advice}")
     if not guessed:

@@ -15,6 +15,7 @@ _DEG = 180.0 / math.pi
 _OVERLOADED_TIMES, _UNTESTED_SHARE = 20.0, 0.01  # tested against rated torque: beyond these a unit or a column is wrong
 _LEAST_MOVED_RAD, _MOST_MOVED_RAD = 0.1 / 60.0 / _DEG, 30.0 / _DEG
 # Between the tips of a loop; a precise reducer gives way by an arcminute, a plastic one by ten degrees.
+FEWEST_BETWEEN = 5  # between the torques of lost motion: six tell of a clearance what all samples do, four twice as much
 FEWEST_SAMPLES = 60
 MOST_CYCLES = 2000
 
@@ -63,8 +64,16 @@ def judge_line(line: Line | None):
 
 
 def judge_lost_motion(found: dict, rated_nm: float, k: float):
-    """A finding where a record's loop does not reach the torques at which lost motion is taken."""
-    amplitude = found["amplitude_Nm"]["estimated"]
+    """A finding where a record's loop does not reach the torques at which lost motion is taken, or has few samples between."""
+    amplitude, rate = found["amplitude_Nm"]["estimated"], found["loading_rate_Nm_per_s"]["estimated"]
+    step = rate / found["sampling"]["rate_hz"]
+    if amplitude >= k * rated_nm and FEWEST_BETWEEN * step > 2.0 * k * rated_nm:
+        yield Finding(
+            "warning",
+            "lost_motion_coarse",
+            f"lost motion is hardly told: samples are {step:.3g} N·m apart, fewer than {FEWEST_BETWEEN} between "
+            f"±k·T_r = ±{k * rated_nm:.3g} N·m; sample faster or load slower",
+        )
     if amplitude < k * rated_nm:
         yield Finding(
             "warning",

@@ -71,6 +71,13 @@ class Blocks:
         return float(reached[reached > (1.0 - SAME_TIP) * reached.max()].mean())
 
     @property
+    def tips_nm(self) -> tuple[float, float]:
+        """Mean torques of the turning points that are about as low as the lowest and as high as the highest [N·m]."""
+        inner = self.turning_nm[1:-1] if self.turning_nm.size > 3 else self.turning_nm
+        near = SAME_TIP * np.abs(inner).max()
+        return float(inner[inner < inner.min() + near].mean()), float(inner[inner > inner.max() - near].mean())
+
+    @property
     def begins_at_tip(self) -> bool:
         """Whether the record begins at a turning point of its own size, which wipes out what was before."""
         return bool(abs(self.turning_nm[0]) >= AT_TIP * np.abs(self.turning_nm).max())

@@ -2,14 +2,17 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 from support.decided import diagnosis, write_evidence
 from support.made_posterior import made_fit
 
+from backdrive_bayes.commands.compare import _require_own_records
 from backdrive_bayes.commands.main import main
 from backdrive_bayes.commands.results import HIGHEST_LEVEL, FitOptions
 from backdrive_bayes.engine import sample
+from backdrive_bayes.errors import BadInput
 
 AREA = made_fit("a")[1]["records"][1]["indicators"]["loop_area_J"]["median"]
 
@@ -111,6 +114,9 @@ def test_compare_with_claims(fits, tmp_path, capsys):
         (["accept", "{a}", "--limits", "{good}", "--batch", "{b}"], "at least 3 other units"),
         (["accept", "{a}", "--limits", "{good}", "--level", "2"], "--level"),
         (["accept", "{a}", "--limits", "{good}", "--level", "0.999999"], "at most 0.99, beyond which too few draws lie"),
+        (["accept", "{a}", "--limits", "{good}", "--k", "0.1"], "--k: expected 0.03, with which 'a' was fitted, found 0.1"),
+        (["accept", "{a}", "--limits", "{good}", "--baseline", "elastic"], "--baseline: expected geometric,elastic,friction"),
+        (["compare", "{a}", "{b}", "--k", "0.1"], "--k: expected 0.03, with which 'a' was fitted"),
         (["compare", "{a}"], "two units or more"),
         (["compare", "{a}", "{none}"], "nothing there"),
         (["compare", "{a}", "{a}"], "units of different records, found the same records in"),
@@ -135,6 +141,20 @@ def test_every_mistake_is_one_line_and_leaves_nothing(fits, tmp_path, capsys, ar
     error = capsys.readouterr().err
     assert expected in error and error.count("\n") == 1 and "Traceback" not in error
     assert not list((tmp_path / "made").iterdir())
+
+
+def test_a_comparison_records_its_own_level(fits, tmp_path):
+    assert main(["compare", str(fits / "a"), str(fits / "b"), "--level", "0.5", "-o", str(tmp_path), "--no-figures"]) == 0
+    found = json.loads((tmp_path / "comparison.json").read_text())
+    assert found["level"] == found["options"]["level"] == 0.5
+
+
+def test_units_that_share_a_record_are_not_compared():
+    """Not only those of the same records all: their draws are not independent."""
+    units = [SimpleNamespace(unit=SimpleNamespace(data_sha256=hashes)) for hashes in (("1", "2"), ("3",), ("2", "4"))]
+    _require_own_records(["a", "b"], units[:2])
+    with pytest.raises(BadInput, match="the same records in 'a' and 'c'"):
+        _require_own_records(["a", "b", "c"], units)
 
 
 def test_the_draws_of_a_fit_resolve_the_highest_level():

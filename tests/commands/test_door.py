@@ -34,3 +34,13 @@ def test_few_isolated_samples_are_said_once_and_left_out():
     (record,) = ready.unit.records
     assert len(record.time_s) == len(unit.records[0].time_s) - 10
     assert record.notes == ("10 isolated samples far from the neighbours left out",)
+
+
+def test_what_is_overruled_of_a_simulator_is_said_of_the_result():
+    """The gap to a simulator of unfit data was told as if nothing had been overruled."""
+    ready = judged(dropped(0.01))
+    simulator = judged(dropped(0.03), force=True)
+    both = ready.beside(simulator)
+    assert both.forced and not ready.forced and ready.beside(None) is ready
+    told = [row for row in both.checked["findings"] if row["record"] == "u: r.csv"]
+    assert [row["text"] for row in told] == [row["text"] for row in simulator.checked["findings"] if row["record"]]

@@ -36,6 +36,22 @@ def test_guessed_columns_are_said_on_screen_and_in_the_file(predicted):
     assert predicted()[0]["notes"] == []
 
 
+def test_stamps_of_a_clock_keep_their_digits(posterior, tmp_path):
+    time = 1.7e9 + 0.01 * np.arange(400)
+    table = np.c_[time, np.interp(np.arange(400), [0, 200, 399], [0, 0.09, 0])]
+    np.savetxt(tmp_path / "h.csv", table, delimiter=",", header="time_s,torque_Nm", comments="", fmt="%.17g")
+    assert main(["predict", posterior, str(tmp_path / "h.csv"), "-o", str(tmp_path / "p")]) == 0
+    found = np.loadtxt(tmp_path / "p" / "prediction.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(found[:, 0], time, rtol=0, atol=1e-5)
+
+
+def test_a_history_has_no_unit_file_to_say_its_columns_in(posterior, tmp_path, capsys):
+    (tmp_path / "h.csv").write_text("a,b\n1,2\n3,4\n")
+    assert main(["predict", posterior, str(tmp_path / "h.csv"), "-o", str(tmp_path / "p")]) == 2
+    error = capsys.readouterr().err
+    assert "a time column 'time_s'" in error and "unit.toml" not in error and "angle" not in error
+
+
 def test_draws_of_an_older_prediction_go_and_a_stranger_s_file_stays(predicted, tmp_path):
     drawn = tmp_path / "p" / "draws.csv"
     drawn.parent.mkdir()

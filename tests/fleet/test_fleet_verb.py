@@ -90,6 +90,7 @@ def test_the_table_has_every_unit_once_with_its_error_or_its_numbers(out):
     table = rows_of(out)
     assert {name: row["status"] for name, row in table.items()} == {"bad.csv": "failed", "u-1": "done", "u-2": "done"}
     assert "bad.csv" in table["bad.csv"]["error"] and table["u-1"]["converged"]
+    assert table["bad.csv"]["error"].startswith("bad.csv"), "where a fleet lies is no part of its results"
     assert json.loads((out / "run.json").read_text())["verb"] == "fleet"
     assert {p.name for p in (out / "figures").iterdir()} >= {"fleet-charts.svg", "fleet-charts.png"}
 

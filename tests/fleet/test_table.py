@@ -8,7 +8,7 @@ from support.fleet_units import row
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.fleet.store import DONE, FAILED, locked, read_stored, result_path, write_result
-from backdrive_bayes.fleet.table import NAME, compact
+from backdrive_bayes.fleet.table import NAME, RECORDS, compact
 from backdrive_bayes.fleet.units import FleetUnit
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="the extra fleet is not installed")
@@ -31,10 +31,18 @@ def kept(out, tmp_path, results):
     return units
 
 
-def test_a_row_a_unit_and_record_and_one_for_an_error(out, tmp_path):
-    units = kept(out, tmp_path, {"b": [row("b", 1, file="1.csv"), row("b", 2.5, file="2.csv")], "a": "no cycle"})
-    assert compact(out, units) == 3
+def test_a_row_a_unit_is_that_of_its_largest_loop(out, tmp_path):
+    loops = ((1.0, 0.5, "small"), (2.0, 1.0, "fast"), (0.5, 1.001, "slow"))
+    rows = [row("b", file=file, loading_rate_Nm_per_s=rate, amplitude_Nm=amplitude) for rate, amplitude, file in loops]
+    assert compact(out, kept(out, tmp_path, {"b": rows, "a": "no cycle"})) == 2
     table = parquet.read_table(out / NAME).to_pylist()
+    assert [(r["unit"], r["file"], r["records"]) for r in table] == [("b", "slow", 3), ("a", None, 0)]
+
+
+def test_a_row_a_record_and_one_for_an_error(out, tmp_path):
+    units = kept(out, tmp_path, {"b": [row("b", 1, file="1.csv"), row("b", 2.5, file="2.csv")], "a": "no cycle"})
+    assert compact(out, units) == 2
+    table = parquet.read_table(out / RECORDS).to_pylist()
     assert [(r["unit"], r["file"], r["status"], r["error"]) for r in table] == [
         ("b", "1.csv", "done", None), ("b", "2.csv", "done", None), ("a", None, "failed", "no cycle"),
     ]  # fmt: skip

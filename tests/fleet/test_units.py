@@ -31,6 +31,14 @@ def test_the_table_of_a_fleet_is_no_unit(tmp_path):
         assert names(tmp_path, tmp_path) == names(tmp_path, tmp_path / "judged") == ["u"]
 
 
+def test_a_prediction_beside_units_is_no_unit(tmp_path):
+    make_unit(tmp_path / "u")
+    (tmp_path / "predicted").mkdir()
+    for name in ("prediction.json", "prediction.csv"):
+        (tmp_path / "predicted" / name).write_text("{}")
+    assert names(tmp_path) == ["u"]
+
+
 def test_links_to_units_count_and_links_to_folders_are_not_followed(tmp_path):
     elsewhere, fleet = make_unit(tmp_path / "elsewhere" / "u").parent, tmp_path / "fleet"
     make_unit(fleet / "a")

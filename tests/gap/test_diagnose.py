@@ -59,6 +59,19 @@ def test_residuals_are_of_what_is_fitted_about_their_mean(twice):
             assert abs(np.mean(row[key])) < 1e-9
 
 
+def test_what_a_baseline_lacks_is_a_gap_that_is_seen():
+    """Gap, place and the model before were those of the whole class: nothing stood out from the noise."""
+    unit = planted(known=smooth_reducer())
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (("FIRST_STEPS", 3), ("MOST_STEPS", 3)):
+            patch.setattr(sample, name, value)
+        found = diagnose(unit, seed=2, baseline=("elastic",)).json
+    assert set(found["answer"]["effects"]) == {"geometric", "friction"}
+    assert found["gap"]["rms_rad"] > 5.0 * found["gap"]["noise_floor_rad"]
+    change = found["shrink"]["indicators"]["lost_motion_rad"]
+    assert change["before"]["median"] > 2.0 * change["after"]["median"]
+
+
 def test_everything_is_plain_numbers(twice):
     text = json.dumps(twice[0].json, allow_nan=False)
     assert len(text) > 5000

@@ -8,10 +8,14 @@ from support.bench import KNOWN_NOISE
 from support.made_posterior import known, made_posterior
 
 from backdrive_bayes.bench.known_truth import KnownReducer, simulate_unit
-from backdrive_bayes.indicators.convergence import _width_as_read, convergence_json, examined
+from backdrive_bayes.indicators.convergence import SHARE, _width_as_read, contradictions, convergence_json, examined
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
-from backdrive_bayes.indicators.indicators import zero_torque_width_rad
+from backdrive_bayes.indicators.indicators import peak_angle_rad, zero_torque_width_rad
+from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.measured_loop import measured_loops
+from backdrive_bayes.records.noise import estimate_noise
+from backdrive_bayes.records.record import Record, Unit
+from backdrive_bayes.records.reduction import reduce_record
 
 LOOPS = ((0.05, 0.1), (0.05, 0.04))
 
@@ -19,6 +23,16 @@ LOOPS = ((0.05, 0.1), (0.05, 0.04))
 @pytest.fixture(scope="module")
 def unit():
     return simulate_unit(known(), [(a, r) for r, a in LOOPS], KNOWN_NOISE, np.random.default_rng(1))
+
+
+def fitted_to(truth, record):
+    """A posterior of the truth with the blocks of a record."""
+    segments = find_segments(record.time_s, record.torque_nm)
+    noise = estimate_noise(record.time_s, record.torque_nm, record.angle_rad, segments)
+    blocks = reduce_record(record, segments, noise, 40)
+    posterior = made_posterior(truth, LOOPS[:1], shape=(4, 50))
+    facts = replace(posterior.records, blocks=(blocks,), amplitude_nm=np.array([blocks.amplitude_nm]))
+    return replace(posterior, records=facts)
 
 
 def judged(truth, unit, **options):
@@ -46,6 +60,24 @@ def test_width_at_zero_torque_counts_too(unit):
     truth = known()
     wide = KnownReducer(truth.weights | {"clearance": 1.2 * truth.weights["clearance"]})
     assert any("w(0)" in text for text in judged(wide, unit).doubts)
+
+
+def test_a_loop_off_centre_is_compared_with_itself():
+    """Between its own tips; the loop of its amplitude about zero, the fault that was there, has other numbers."""
+    truth, (low, high), rate = known(), (-0.05, 0.1), 0.05
+    corner = np.array([0.0, high, low, high])
+    at = np.r_[0.0, np.cumsum(np.abs(np.diff(corner)))] / rate
+    time = np.arange(0.0, at[-1], 1 / 200.0)
+    torque, rng = np.interp(time, at, corner), np.random.default_rng(4)
+    noisy = truth.angle_rad(time, torque) + 5e-5 * rng.standard_normal(time.size)
+    record = Record("a.csv", time, torque + 1e-4 * rng.standard_normal(time.size), noisy, rate, None)
+    draws = IndicatorDraws(fitted_to(truth, record), 0.03)
+    measured = measured_loops(Unit("u", 0.1, (record,)))
+    assert contradictions(draws, measured) == []
+    blocks = draws.posterior.records.blocks[0]
+    assert blocks.tips_nm == pytest.approx((low, high), rel=0.02)
+    whole = peak_angle_rad(draws.loops(rate, blocks.amplitude_nm)).mean()
+    assert abs(measured[0].half_peak_to_peak_rad / whole - 1.0) > SHARE["settled"]
 
 
 def test_a_step_next_to_zero_torque_is_compared_as_it_was_read():

@@ -37,6 +37,15 @@ def test_clean_record_is_described(tmp_path):
     assert abs(record["closure"]["difference_rad"]) < 4 * record["closure"]["sd_rad"] + 0.05 * ARCMIN
 
 
+def test_few_samples_where_lost_motion_is_taken_are_said():
+    """Six between ±k·T_r tell it, four do not."""
+    for samples, told in ((6, False), (4, True)):
+        time, torque = ramps(noise=0.0, rate=1.0)
+        every = int(round(0.06 / samples * 200))
+        result, _ = judged(time[::every], torque[::every], answer(torque)[::every])
+        assert ("lost motion is hardly told" in texts(result, "warning")) == told
+
+
 def test_contradiction_with_what_is_declared():
     result, _ = judged(*ramps(noise=0.002), loading_rate_nm_per_s=0.5, amplitude_nm=2.0)
     assert "declared amplitude 2" in texts(result, "warning")
