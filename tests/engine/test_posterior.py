@@ -155,7 +155,7 @@ def test_draws_depart_from_their_mean_by_all_that_a_record_sees(name, part):
     """As the columns of the model say that was sampled; forms of one effect, and effects and class, stand against each other."""
     linear = prepared(name)[0]
     posterior = fitted_by(linear, (name,))
-    away = {n: w - w.mean(axis=(0, 1)) for n, w in posterior.weights.items()}
+    away = {n: posterior.weights[n] - posterior.weights[n].mean(axis=(0, 1)) for n in linear.design.names}
     # What moves a parameter has the columns of the mean weights, which few draws hardly tell.
     posterior = replace(posterior, weights={n: w + linear.weights[n] for n, w in away.items()})
     flat = {n: w.reshape(-1, w.shape[-1]) for n, w in away.items()}

@@ -13,6 +13,7 @@ from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.gap import examine, next_test, where
 from backdrive_bayes.gap.averaged import weighed_unit
 from backdrive_bayes.gap.shrink import Shrink, _alone, closed_fraction, fit_hypothesis, shrink, within_reach
+from backdrive_bayes.mechanics.history import loading_rate
 from backdrive_bayes.mechanics.registry import library_terms
 
 
@@ -234,8 +235,8 @@ def test_a_dwell_that_is_proposed_is_one_and_has_the_rate_of_its_ramps():
     rests = (dwells.t1 - dwells.t0) > 29.0
     assert rests.sum() == 2 and np.all(dwells.z0[rests] == dwells.z1[rests]) and np.all(np.abs(dwells.z0[rests]) == 1.0)
     assert plain.t1[-1] == pytest.approx(10.0) and dwells.t1[-1] == pytest.approx(70.0)
-    mean = np.abs(dwells.z1 - dwells.z0).sum() / dwells.t1[-1]
-    ramp = np.exp(np.log(mean) + np.broadcast_to(dwells.surge, (2, rests.size)))[:, np.abs(dwells.z1) < 0.5]
+    usual = loading_rate(np.r_[dwells.t0[:1], dwells.t1], np.r_[dwells.z0[:1], dwells.z1])
+    ramp = np.exp(np.log(usual) + np.broadcast_to(dwells.surge, (2, rests.size)))[:, np.abs(dwells.z1) < 0.5]
     assert ramp == pytest.approx(rate, rel=1e-6)
 
 
