@@ -54,7 +54,7 @@ class Diagnosed:
     @cached_property
     def labels(self) -> list[str]:
         """A short unique name of each record: its rate, or its file's name where rates repeat."""
-        by_rate = [f"{plain(r['loading_rate_Nm_per_s'])} N·m/s" for r in self.records]
+        by_rate = [f"{plain(r['loading_rate_Nm_per_s'], 2)} N·m/s" for r in self.records]
         by_file = [_SUFFIX.sub("", Path(str(r["file"])).name) for r in self.records]
         for labels in (by_rate, by_file):
             if len(set(labels)) == len(labels) and all(0 < len(x) <= 20 for x in labels):

@@ -63,7 +63,7 @@ def unit_of(quantity: dict) -> tuple[float, str]:
 
 def quantity_words(quantity: dict, loops: int) -> str:
     """A quantity in words, with its loop where the batch has several."""
-    at = f" at {plain(quantity['loading_rate_Nm_per_s'])} N·m/s" if quantity["amplitude_Nm"] is not None and loops > 1 else ""
+    at = f" at {plain(quantity['loading_rate_Nm_per_s'], 2)} N·m/s" if quantity["amplitude_Nm"] is not None and loops > 1 else ""
     return f"{drawn_words(quantity['name'])}{at}"
 
 

@@ -135,7 +135,7 @@ def in_parts(name: str, draw, saved, each: list[list]) -> dict[str, partial]:
 
 def loop_words(at: dict) -> str:
     """Loading rate and amplitude of a record object, or of anything else that has them."""
-    return f"{plain(at['loading_rate_Nm_per_s'])} N·m/s, ±{plain(at['amplitude_Nm'])} N·m"
+    return f"{plain(at['loading_rate_Nm_per_s'], 2)} N·m/s, ±{plain(at['amplitude_Nm'])} N·m"
 
 
 def reach(interval: dict) -> list[list[float]]:
@@ -145,7 +145,7 @@ def reach(interval: dict) -> list[list[float]]:
 
 def record_labels(records) -> list[str]:
     """A short, unique name for each record object: its rate, with the amplitude or a number where rates repeat."""
-    labels = [f"{plain(r['loading_rate_Nm_per_s'])} N·m/s" for r in records]
+    labels = [f"{plain(r['loading_rate_Nm_per_s'], 2)} N·m/s" for r in records]
     if len(set(labels)) < len(labels):
         labels = [loop_words(r) for r in records]
     if len(set(labels)) < len(labels):

@@ -9,7 +9,7 @@ from support.pdf import Pages
 from support_results import GROUP_ATTRIBUTES, indicators, write_result
 
 from backdrive_bayes.errors import BadInput, MissingExtra
-from backdrive_bayes.figures.style import loop_words, shown_unit
+from backdrive_bayes.figures.style import loop_words, record_labels, shown_unit
 from backdrive_bayes.number_text import interval_text, significant, with_error
 from backdrive_bayes.report import fit_section, report
 from backdrive_bayes.report.blocks import Note, Picture, Table
@@ -302,6 +302,9 @@ def test_the_main_figure_stands_once_however_long_the_facts_are(rows, tmp_path):
 def test_settings_are_told_without_powers_of_ten():
     at = {"loading_rate_Nm_per_s": 104.0, "amplitude_Nm": 1040.0}
     assert loop_words(at) == "104 N·m/s, ±1040 N·m" and loop_words(dict.fromkeys(at, 0.05)) == "0.05 N·m/s, ±0.05 N·m"
+    # Rates of two records that differ by chance are told apart by their amplitudes.
+    two = [{"loading_rate_Nm_per_s": rate, "amplitude_Nm": amplitude} for rate, amplitude in ((0.05, 0.1), (0.0501, 0.04))]
+    assert record_labels(two) == ["0.05 N·m/s, ±0.1 N·m", "0.05 N·m/s, ±0.04 N·m"]
     assert shown_unit("N·m", [0.0, 0.0, 67.01]) == (1.0, "N·m") and shown_unit("N·m", [0.01, 0.0, 0.02]) == (1e3, "mN·m")
 
 
