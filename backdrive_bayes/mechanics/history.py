@@ -71,7 +71,9 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     sampled, who = _samples(blocks)
     sampled, many, ends = sampled - lag_s, blocks.count > FEW, np.r_[blocks.begin_s[0], blocks.end_s[-1]]
     edges = np.r_[blocks.begin_s[many], blocks.end_s[many], ends] - lag_s
-    cuts = np.unique(np.r_[edges, sampled, blocks.path_s[1:-1], _bends(blocks.path_s, blocks.path_nm / torque_scale_nm)])
+    path = blocks.path_s, blocks.path_nm / torque_scale_nm
+    usual = loading_rate(*path)
+    cuts = np.unique(np.r_[edges, sampled, blocks.path_s[1:-1], _bends(*path, usual)])
     middle = 0.5 * (cuts[1:] + cuts[:-1])
     owner = np.clip(np.searchsorted(blocks.begin_s - lag_s, middle, side="right") - 1, 0, blocks.count.size - 1)
     # What passes in a gap between two blocks is in the mean of neither.
@@ -82,7 +84,7 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     owner, weight = np.r_[owner, who], np.r_[weight, 1.0 / blocks.count[who]]
     order = np.lexsort((t0, t1))
     z0, z1 = (np.interp(t[order], blocks.path_s, blocks.path_nm) / torque_scale_nm + offset for t in (t0, t1))
-    surge = _surge(blocks.path_s, blocks.path_nm / torque_scale_nm, np.stack([t0[order], t1[order]]))
+    surge = _surge(*path, np.stack([t0[order], t1[order]]), usual)
     # A tip is reached from the other side.
     state = "neutral" if not blocks.begins_at_tip else "lower" if blocks.turning_nm[0] > 0 else "upper"
     return History(z0, z1, t0[order], t1[order], owner[order], weight[order], blocks.count.size, surge, state)
@@ -101,7 +103,7 @@ def through(time_s, torque_nm, torque_scale_nm: float) -> History:
     """History straight between given samples; segment i ends at sample i + 1 and is a block of its own."""
     z, count = np.asarray(torque_nm, float) / torque_scale_nm, len(torque_nm) - 1
     time = np.asarray(time_s, float)
-    surge = _surge(time, z, np.stack([time[:-1], time[1:]]))
+    surge = _surge(time, z, np.stack([time[:-1], time[1:]]), loading_rate(time, z))
     return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count, surge)
 
 
@@ -123,18 +125,18 @@ def loading_rate(time_s, torque) -> float:
     return 0.0
 
 
-def _bends(time_s, z) -> np.ndarray:
+def _bends(time_s, z, usual: float) -> np.ndarray:
     """Instants [s] at which the loading rate about them bends, none where it is the same everywhere."""
-    if np.ndim(_surge(time_s, z, time_s)) == 0:
+    if np.ndim(_surge(time_s, z, time_s, usual)) == 0:
         return np.empty(0)
-    half = FILM / loading_rate(time_s, z)
+    half = FILM / usual
     found = np.r_[time_s - half, time_s + half]
     return found[(found > time_s[0]) & (found < time_s[-1])]
 
 
-def _surge(time_s, z, at_s) -> np.ndarray | float:
-    """Logarithm of the loading rate about instants [s] over that of a path that is straight between ``time_s``."""
-    passed, usual = np.r_[0.0, np.cumsum(np.abs(np.diff(z)))], loading_rate(time_s, z)
+def _surge(time_s, z, at_s, usual: float) -> np.ndarray | float:
+    """Logarithm of the loading rate about instants [s] over the ``usual`` one of a path that is straight between ``time_s``."""
+    passed = np.r_[0.0, np.cumsum(np.abs(np.diff(z)))]
     # About every instant of a path within the film lies the whole of it.
     if not passed[-1] > FILM:
         return 0.0

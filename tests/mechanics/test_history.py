@@ -105,7 +105,7 @@ def test_thresholds_that_follow_the_rate_are_followed_where_it_bends(monkeypatch
     def angles(cuts=None):
         with monkeypatch.context() as patch:
             if cuts is not None:
-                patch.setattr(module, "_bends", lambda time_s, z: cuts)
+                patch.setattr(module, "_bends", lambda time_s, z, usual: cuts)
             history = of_blocks(blocks, SCALE)
         parts = (p.cells.grown(0.4 * history.surge) if p.name in FRICTION else p.cells for p in known.reducer.parts)
         return sum(c.summed(history, known.weights[p.name]) for c, p in zip(parts, known.reducer.parts, strict=True))
