@@ -55,7 +55,7 @@ def summarise(units: list[tuple[str, str, list[dict]]], order: str | None = None
     return {
         "schema": FLEET,
         "counts": _counts(firsts),
-        "data_sha256": [first["data_sha256"] for first in firsts if first["data_sha256"]],
+        "data_sha256": [digest for first in firsts for digest in (first["data_sha256"] or "").split(",") if digest],
         "verdicts": _shares(rows[0].get("verdict") for _, rows in done),
         "effects": _shares(rows[0].get("answer") for _, rows in done),
         "failures": [{"unit": f["unit"], "status": f["status"], "error": f["error"]} for f in firsts if f["status"] != DONE],

@@ -8,6 +8,7 @@ from support.fleet_units import row
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.fleet.store import DONE, FAILED, locked, read_stored, result_path, write_result
+from backdrive_bayes.fleet.summary import collect, summarise
 from backdrive_bayes.fleet.table import NAME, RECORDS, compact
 from backdrive_bayes.fleet.units import FleetUnit
 
@@ -83,3 +84,10 @@ def test_a_table_that_has_no_room_is_said_and_the_old_one_stays(small_disk, tmp_
 def test_results_of_units_that_are_no_more_stay_out(out, tmp_path):
     units = kept(out, tmp_path, {"u": [row("u")], "gone": [row("gone")]})
     assert compact(out, units[:1]) == 1 and result_path(out, units[1]).exists()
+
+
+def test_hashes_are_one_a_record(out, tmp_path):
+    """Those of several records were one word with commas."""
+    (unit,) = kept(out, tmp_path, {"b": [row("b", data_sha256="1,2", file="1.csv"), row("b", data_sha256="1,2", file="2.csv")]})
+    assert read_stored(out, unit)["data_sha256"] == ["1", "2"]
+    assert summarise(collect(out, [unit]))["data_sha256"] == ["1", "2"]
