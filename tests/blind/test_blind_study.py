@@ -7,12 +7,16 @@ import shutil
 import pytest
 from invented import look_around, never, stumble
 
+from backdrive_bayes.blind.answers import understand
+from backdrive_bayes.blind.diagnosing import diagnose_folder
+from backdrive_bayes.blind.drawing import draw_and_write
 from backdrive_bayes.blind.key import folder_digest
 from backdrive_bayes.blind.request import Request
 from backdrive_bayes.blind.seal import find_leaks
 from backdrive_bayes.blind.study import Study, _calls, run_study
 from backdrive_bayes.commands.output import write_json
 from backdrive_bayes.errors import BadInput
+from backdrive_bayes.indicators import convergence
 
 REQUEST = Request(4, severities=(1.0,), classes=("none", "sensor_lag", "torque_offset"), plan="quick", seed=3)
 
@@ -62,10 +66,9 @@ def test_a_refused_check_leaves_another_one_as_it_is(finished, tmp_path):
     out, _ = finished
     shutil.copytree(out, tmp_path / "out", ignore=shutil.ignore_patterns("key", "answers"))
     before = {p.name: folder_digest(p) for p in sorted((tmp_path / "out" / "units").iterdir())}
-    for other in (Request(6, plan="quick", seed=3), Request(2, plan="quick", seed=9)):
-        with pytest.raises(BadInput, match="take a new OUT"):
-            run_study(Study(other, tmp_path / "out", never, write_json))
-        assert {p.name: folder_digest(p) for p in sorted((tmp_path / "out" / "units").iterdir())} == before
+    with pytest.raises(BadInput, match="take a new OUT"):
+        run_study(Study(Request(5, plan="quick", seed=9), tmp_path / "out", never, write_json))
+    assert {p.name: folder_digest(p) for p in sorted((tmp_path / "out" / "units").iterdir())} == before
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["key.sha256", "units"]
     shutil.copytree(out / "units" / "unit-0001", tmp_path / "out" / "units" / "unit-0009")
     with pytest.raises(BadInput, match="unit-0009 beside them"):
@@ -150,3 +153,12 @@ def test_what_raises_or_dies_is_counted_and_an_interrupted_check_goes_on(tmp_pat
     assert errors == {"unit-0002": "ValueError: two lines", "unit-0003": "the process died"}
     assert result["counts"] == {"units": 4, "answered": 2, "failed": 2}
     assert result["removed"]["unknown"]["of"] == 2
+
+
+def test_what_the_measurement_contradicts_is_no_answer(tmp_path, monkeypatch):
+    """As the verb says it: the blind check took the sampling's word alone."""
+    drawn = draw_and_write(Request(1, plan="quick", seed=4), 0, {}, tmp_path)
+    monkeypatch.setattr(convergence, "contradictions", lambda draws, measured: ["S was measured as 2 J"])
+    found = diagnose_folder(tmp_path / drawn["unit"], None)
+    answer = understand(found)
+    assert found["convergence"]["contradictions"] and answer.label is None and answer.error.startswith("inconclusive")
