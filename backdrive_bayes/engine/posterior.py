@@ -11,7 +11,7 @@ from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, GrowthEffect
 from backdrive_bayes.mechanics.history import History, loading_rate, through
-from backdrive_bayes.mechanics.reducer import BEFORE, GROWING, ReducerClass
+from backdrive_bayes.mechanics.reducer import GROWING, ReducerClass
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +122,15 @@ class Posterior:
         return sum((self._grown(part, history, law, growth, mean) for part in range(len(GROWING))), found)
 
     def _grown(self, part: int, history, law, growth, mean):
-        """What growths of one kind of thresholds other than the mode's add, (draws, segments): what is the same along the history
-        as it is, what varies along it, and a drag before all parts, which is never negative, by the derivative."""
+        """What growths of one kind of thresholds other than the mode's add, (draws, segments): those that the records told by the
+        derivative, as the other weights were drawn beside them, those that have no scale because nothing tells them as they are."""
         found = shift = np.zeros(())
         for effect in (e for e in self.effects if isinstance(e, GrowthEffect) and e.part == part and e.name in self.flat):
             away, term = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter), law[effect.term]
-            level = 0.0 if part == BEFORE else float(np.mean(term))
-            shift = shift + away * level
-            if np.any(term != level):
-                (grown,) = self.reducer.grown(history, mean, growth, part, [term - level], ends=True)
+            if effect.name not in self.log_scale:
+                shift = shift + away * float(np.mean(term))
+            elif np.any(term):
+                (grown,) = self.reducer.grown(history, mean, growth, part, [term], ends=True)
                 found = found + np.outer(away, grown)
         return found + self.reducer.shifted(history, mean, growth, part, shift) if np.any(shift) else found
 
