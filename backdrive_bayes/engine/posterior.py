@@ -123,7 +123,8 @@ class Posterior:
 
     def _grown(self, part: int, history, law, growth, mean):
         """What growths of one kind of thresholds other than the mode's add, (draws, segments): those that the records told by the
-        derivative, as the other weights were drawn beside them, those that have no scale because nothing tells them as they are."""
+        derivative, beside which the other weights were drawn; those that have no scale, because nothing tells them, as they are.
+        """
         found = shift = np.zeros(())
         for effect in (e for e in self.effects if isinstance(e, GrowthEffect) and e.part == part and e.name in self.flat):
             away, term = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter), law[effect.term]
