@@ -67,9 +67,13 @@ def refuse_others(out: Path, names) -> None:
         raise BadInput(Path(out) / UNITS, "the units of this check alone", f"{others[0]} beside them")
 
 
-def refuse_changed(out: Path, entries) -> None:
-    """Raise BadInput when a unit's folder is not the one that the key was made for."""
+def refuse_changed(out: Path, entries, opened: bool) -> None:
+    """Raise BadInput when a unit's folder is not the one that the key was made for; once it is ``opened`` it may be gone."""
     for entry in entries:
         folder = Path(out) / UNITS / entry["unit"]
+        if opened and not folder.exists():
+            continue
+        if not folder.is_dir():
+            raise BadInput(folder, "the files that were drawn", "none")
         if folder_digest(folder) != entry["folder_sha256"]:
             raise BadInput(folder, "the files that were drawn", "changed ones")

@@ -51,7 +51,7 @@ def run_study(study: Study) -> dict:
     key = json.loads(data)
     for kind in ROUNDS:
         _answer(study, kind, _calls(study, kind, key["units"]), opened)
-    seal.refuse_changed(study.out, key["units"])
+    seal.refuse_changed(study.out, key["units"], opened)
     if not opened:
         (study.out / seal.KEY).parent.mkdir(exist_ok=True)
         (study.out / seal.KEY).write_bytes(data)

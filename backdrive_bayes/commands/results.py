@@ -70,7 +70,7 @@ class FitOptions:
 
 def require_fitted_with(options: FitOptions, about: dict, names=("baseline", "k", "level", "seed")) -> None:
     """BadInput where an option was given that a former fit, whose indicators object is ``about``, was made without."""
-    fitted = {"baseline": tuple(about["model"]["modules"]), "k": about["k"], "level": about["level"], "seed": about["seed"]}
+    fitted = {"baseline": tuple(about["options"]["baseline"]), "k": about["k"], "level": about["level"], "seed": about["seed"]}
     for name in names:
         given, usual = getattr(options, name), getattr(FitOptions, name)
         alike = [sorted(v) if name == "baseline" else v for v in (given, usual, fitted[name])]

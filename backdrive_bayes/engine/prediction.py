@@ -104,5 +104,6 @@ def _from(posterior, time, torque, rate, preload_nm):
     own = np.r_[0, np.cumsum(pieces)].astype(int)
     time, torque = (np.interp(np.arange(own[-1] + 1), own, along) for along in (time, torque))
     # A record has the thresholds of its own amplitude, whatever went before it.
-    history = replace(through(np.r_[early, time], np.r_[before, torque], scale), largest=float(np.abs(torque).max()) / scale)
+    history = through(np.r_[early, time], np.r_[before, torque], scale, rate)
+    history = replace(history, largest=float(np.abs(torque).max()) / scale)
     return posterior.angles(history, rate)[:, before.size - 1 + own]

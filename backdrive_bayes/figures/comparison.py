@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from backdrive_bayes.figures.fonts import drawn_name
+from backdrive_bayes.figures.fonts import drawn_names
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -84,7 +84,7 @@ def with_ratios(comparison: dict) -> list[int]:
 
 def draw_ratios(comparison: dict, pairs: list[int]):
     """Forest plot of the first of the given pairs of units, one series a condition."""
-    both = comparison["pairs"][pairs[0]]
+    both, shown_as = comparison["pairs"][pairs[0]], drawn_names(comparison["names"])
     shown = [name for name in SHOWN if any((c["indicators"].get(name) or {}).get("ratio") for c in both["conditions"])]
     with styled():
         figure = new_figure(0.9 + 0.05 * len(shown) * max(3.0, len(both["conditions"])))
@@ -103,7 +103,7 @@ def draw_ratios(comparison: dict, pairs: list[int]):
         panel.axvline(1.0, color="black", linewidth=0.7)
         panel.set(xscale="log", yticks=range(len(shown)), ylim=(len(shown) - 0.45, -0.55))
         panel.set_yticklabels([drawn_words(name) for name in shown])
-        panel.set_xlabel(f"ratio: {drawn_name(both['first'])} over {drawn_name(both['second'])} [–]")
+        panel.set_xlabel(f"ratio: {shown_as[both['first']]} over {shown_as[both['second']]} [–]")
         _plain_log(panel)
         legend_below(figure, panel, columns=3)
     return figure
@@ -111,7 +111,8 @@ def draw_ratios(comparison: dict, pairs: list[int]):
 
 def draw_mechanism(comparison: dict):
     """Stacked shares of S and the elastic share of W_abs, one bar a unit and record."""
-    bars = [(m["unit"], r) for m in comparison["mechanism"] for r in m["records"]]
+    shown_as = drawn_names(comparison["names"])
+    bars = [(shown_as[m["unit"]], r) for m in comparison["mechanism"] for r in m["records"]]
     with styled():
         figure = new_figure(0.85 + 0.19 * len(bars))
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.5, 1])
@@ -122,7 +123,7 @@ def draw_mechanism(comparison: dict):
             _bar(right, record["elastic_share"], row, 0.0, "given back", SKY, "")
         left.axvline(1.0, color="black", linewidth=0.7)
         left.set(xlim=(0, min(max(1.0, left.get_xlim()[1]), MOST_OF_S)), xlabel="share of S [–]", ylim=(len(bars) - 0.5, -0.5))
-        left.set_yticks(range(len(bars)), [f"{drawn_name(name)}, {loop_words(r)}" for name, r in bars])
+        left.set_yticks(range(len(bars)), [f"{name}, {loop_words(r)}" for name, r in bars])
         right.set(xlim=(0, 1), xlabel="given back/absorbed [–]")
         legend_below(figure, left, right, columns=3)
     return figure
@@ -148,10 +149,11 @@ def _panels(figure, comparison, conditions):
 
 def _members(comparison, overlay, group):
     """Record object, look and name of every unit of a group in an overlay."""
+    shown_as = drawn_names(comparison["names"])
     for member in comparison["overlays"][overlay]["units"]:
         unit = comparison["names"].index(member["unit"])
         if unit in group:
-            yield comparison["units"][unit]["records"][member["record"]], SERIES[unit % len(SERIES)], drawn_name(member["unit"])
+            yield comparison["units"][unit]["records"][member["record"]], SERIES[unit % len(SERIES)], shown_as[member["unit"]]
 
 
 def _one_loop(panel, record, look, name):

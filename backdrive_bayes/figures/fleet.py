@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.ticker import MaxNLocator
 
-from backdrive_bayes.figures.fonts import drawn_name
+from backdrive_bayes.figures.fonts import drawn_names
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -116,9 +116,10 @@ def _distributions(result):
         low, high = min(values), max(values)
         edges = [low + (high - low or 1.0) * i / bins for i in range(bins + 1)]
         axes.hist(values, edges, color="0.85")
+        shown = drawn_names(batches)
         for look, batch in zip(SERIES, batches, strict=False):
             own = [v for v, u in zip(values, result["charted"], strict=True) if u["batch"] == batch]
-            axes.hist(own, edges, histtype="step", color=look["color"], linestyle=look["linestyle"], label=drawn_name(batch))
+            axes.hist(own, edges, histtype="step", color=look["color"], linestyle=look["linestyle"], label=shown[batch])
         axes.set_xlabel(f"{drawn_words(chart['indicator'])}{f' [{unit}]' if unit else ''}")
         few_ticks(axes)
     figure.axes[0].set_ylabel("units")

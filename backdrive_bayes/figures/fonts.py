@@ -46,7 +46,13 @@ def drawable(text, longest: int) -> str:
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def drawn_name(name: str, most: int = 24) -> str:
-    """A unit's name, shortened, for a figure: what begins with an underscore would be left out of legends."""
-    text = shortened(drawable(shortened(name, most), 3 * most), most + most // 3)
-    return f" {text}" if text.startswith("_") else text
+def drawn_names(names, most: int = 24) -> dict[str, str]:
+    """Units' names, shortened, for a figure, those that come out alike numbered: what begins with an underscore would be left out
+    of legends, and what no font holds takes many letters."""
+    short = {}
+    for name in names:
+        tried = (drawable(shortened(name, length), 9 * most) for length in range(most, 0, -1))
+        text = next((t for t in tried if len(t) <= most + most // 3), "…")
+        short[name] = f" {text}" if text.startswith("_") else text
+    alike = list(short.values())
+    return {n: t if alike.count(t) == 1 else f"{t} ({alike[: i + 1].count(t)})" for i, (n, t) in enumerate(short.items())}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backdrive_bayes.figures.fonts import drawn_name
+from backdrive_bayes.figures.fonts import drawn_names
 from backdrive_bayes.figures.style import (
     BLUE,
     GREY,
@@ -75,7 +75,7 @@ def _units(chosen):
     for axes, quantity in zip(figure.subplots(1, len(chosen), sharey=True, squeeze=False)[0], chosen, strict=True):
         _panel(axes, quantity, order)
     first = figure.axes[0]
-    first.set_yticks(range(len(order)), [drawn_name(name, 18) for name in order])
+    first.set_yticks(range(len(order)), list(drawn_names(order, 18).values()))
     first.tick_params(axis="y", length=0, labelsize=7)
     first.set_ylim(len(order) - 0.4, -0.6)
     legend_below(figure, *figure.axes, columns=5)

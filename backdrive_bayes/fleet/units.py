@@ -13,8 +13,9 @@ from backdrive_bayes.records.readers import record_suffix
 
 UNIT_FILE = "unit.toml"
 LOCK = ".fleet.lock"
-RESULTS = {"indicators.json", "diagnosis.json", "verdict.json", "comparison.json", "prediction.json", "check.json"}
 """Lies in a folder to which a fleet's table is written."""
+PREDICTION, PREDICTED = "prediction.json", ("prediction.csv", "draws.csv")
+"""What a prediction writes, and which of it looks like records."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,9 @@ def find_units(folder: Path, out: Path) -> list[FleetUnit]:
         found += [here / name for name in below if (here / name).is_symlink() and (here / name / UNIT_FILE).is_file()]
         below[:] = sorted(name for name in below if not name.startswith(".") and here / name != out)
         # What the package itself wrote is no record.
-        if LOCK not in files and not RESULTS.intersection(files):
-            found += [here / name for name in sorted(files) if not name.startswith(".") and record_suffix(here / name)]
+        own = PREDICTED if PREDICTION in files else ()
+        records = (name for name in sorted(files) if not name.startswith(".") and name not in own and record_suffix(here / name))
+        found += [here / name for name in records] if LOCK not in files else []
     if not found:
         raise BadInput(folder, "a folder with units (unit.toml and record files) below it", "none")
     return sorted((FleetUnit(_name(path, folder), path) for path in found), key=lambda unit: unit.name)

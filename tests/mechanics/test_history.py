@@ -91,6 +91,11 @@ def test_a_rest_where_the_torque_turns_is_no_loading():
     stairs = np.array([0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 2.0])
     assert loading_rate(np.arange(8.0), stairs) == pytest.approx(4.0 / 6.0)
     assert loading_rate(np.arange(3.0), np.ones(3)) == 0.0
+    # A tick of the noise between a leg and its rest makes no loading of the rest.
+    for tick in (1e-3, -1e-3):
+        ticked = np.array([0.0, 0.0, 1.0 - tick, 1.0, 1.0, -1.0, -1.0 + 1e-6, 1.0])
+        when = np.array([0.0, 9.0, 9.999, 10.0, 13.0, 15.0, 18.0, 20.0])
+        assert loading_rate(when, ticked) == pytest.approx(1.0, rel=0.01)
     turned = -stairs[::-1]
     assert loading_rate(np.arange(8.0), turned) == loading_rate(np.arange(8.0), stairs)
     long = np.r_[-1e5, time[1:]]
