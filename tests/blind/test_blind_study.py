@@ -80,6 +80,8 @@ def test_units_that_were_changed_are_not_scored(finished, tmp_path):
     out, result = finished
     shutil.copytree(out, tmp_path / "out")
     assert run_study(study(tmp_path / "out", never, oracle=1)) == result
+    shutil.rmtree(tmp_path / "out" / "units" / "unit-0001")
+    assert run_study(study(tmp_path / "out", never, oracle=1)) == result, "an opened check needs its units no more"
     path = next((tmp_path / "out" / "units" / "unit-0002").glob("*.csv.gz"))
     path.write_bytes(path.read_bytes()[:-9])
     with pytest.raises(BadInput, match="the files that were drawn"):

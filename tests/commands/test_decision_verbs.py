@@ -10,7 +10,7 @@ from support.made_posterior import made_fit
 
 from backdrive_bayes.commands.compare import _require_own_records
 from backdrive_bayes.commands.main import main
-from backdrive_bayes.commands.results import HIGHEST_LEVEL, FitOptions
+from backdrive_bayes.commands.results import HIGHEST_LEVEL, FitOptions, require_fitted_with
 from backdrive_bayes.engine import sample
 from backdrive_bayes.errors import BadInput
 
@@ -141,6 +141,14 @@ def test_every_mistake_is_one_line_and_leaves_nothing(fits, tmp_path, capsys, ar
     error = capsys.readouterr().err
     assert expected in error and error.count("\n") == 1 and "Traceback" not in error
     assert not list((tmp_path / "made").iterdir())
+
+
+def test_a_baseline_is_the_one_that_was_asked_for():
+    """Also where the fit holds the module again that was withheld, as a diagnosis does."""
+    about = {"unit": "u", "k": 0.03, "level": 0.9, "seed": 0, "options": {"baseline": ["geometric", "elastic"]}}
+    require_fitted_with(FitOptions(("elastic", "geometric")), about)
+    with pytest.raises(BadInput, match="--baseline: expected geometric,elastic, with which 'u' was fitted, found elastic"):
+        require_fitted_with(FitOptions(("elastic",)), about)
 
 
 def test_a_comparison_records_its_own_level(fits, tmp_path):

@@ -34,6 +34,18 @@ def test_an_unknown_state_is_wider_until_the_first_large_torque():
     assert unknown[0] > 10 * rest[0] and unknown[-1] < 1.3 * rest[-1]
 
 
+def test_a_rest_before_a_history_does_not_change_its_thresholds():
+    """After a preload of either side; the rate of the path alone and that of the path with what went before parted."""
+    posterior = made_posterior()
+    posterior = replace(posterior, distortion=replace(posterior.distortion, friction_exponent=0.2, drag_exponent=0.2))
+    time, torque = np.array([0.0, 600.0, 610.0, 630.0, 650.0]), np.array([0.0, 0.0, 0.1, -0.1, 0.1])
+    fine = np.unique(np.r_[0.0, np.linspace(600.0, 650.0, 501)])
+    for preload in (0.1, -0.1):
+        rested = prediction._from(posterior, fine, np.interp(fine, time, torque), 0.01, preload)[:, 200:].mean(axis=0)
+        prompt = prediction._from(posterior, fine[1:], np.interp(fine[1:], time, torque), 0.01, preload)[:, 199:].mean(axis=0)
+        assert np.abs(rested - prompt).max() < 1e-3 * np.ptp(prompt)
+
+
 def test_what_creeps_bends_between_points_that_lie_far_apart(monkeypatch):
     """Only the turning points are given; the planted fault follows creep straight from one to the next."""
     posterior = made_posterior()

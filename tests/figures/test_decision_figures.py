@@ -87,12 +87,12 @@ def test_limits_are_seen_even_where_the_posterior_is_narrow(figures):
 def test_many_units_of_strange_names_are_told_apart(tmp_path_factory):
     """Eight units have looks of their own in each figure, and every name stands in its legend: also one that begins with an
     underscore, that no font holds, or whose end alone tells it from another."""
-    names = [f"RV-110E-127_SN20261128-00{i}" for i in range(5)] + ["_hidden", "减速器", "plain"]
+    names = [f"RV-110E-127_SN20261128-00{i}" for i in range(5)] + ["_hidden", "歯車一号機", "歯車二号機"]
     result = saved(tmp_path_factory, compare([evidence(name, loops=SMALL[:1]) for name in names]))
     figures = {n: f for n, f in catalogue.comparison_figures(result).items() if n.startswith("comparison-loops")}
     assert list(figures) == ["comparison-loops", "comparison-loops-2"]
     shown = [t.get_text() for f in figures.values() for legend in f.legends for t in legend.get_texts()]
-    assert len(set(shown)) == 8 and any("hidden" in s for s in shown) and any("u{51CF}" in s for s in shown)
+    assert len(set(shown)) == 8 and any("hidden" in s for s in shown) and any("u{6B6F}" in s for s in shown)
     for figure in figures.values():
         looks = [(line.get_linestyle(), line.get_color()) for line in figure.legends[0].get_lines()]
         assert len(set(looks)) == len(looks) <= 6

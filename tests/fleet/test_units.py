@@ -36,7 +36,9 @@ def test_a_prediction_beside_units_is_no_unit(tmp_path):
     (tmp_path / "predicted").mkdir()
     for name in ("prediction.json", "prediction.csv"):
         (tmp_path / "predicted" / name).write_text("{}")
-    assert names(tmp_path) == ["u"]
+    (tmp_path / "lone.csv").write_text("x")
+    (tmp_path / "check.json").write_text("{}")
+    assert names(tmp_path) == ["lone.csv", "u"], "a record beside another result stays one"
 
 
 def test_links_to_units_count_and_links_to_folders_are_not_followed(tmp_path):
