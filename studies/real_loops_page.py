@@ -137,8 +137,8 @@ def draw(fits, path: Path) -> None:
         axis.plot(c["torque_nm"], 100 * (c["measured"] - middle) / half, "k.", ms=2, label="measured")
         miss = 100 * r["small_predicted"]["rms_rad"] / half
         axis.set(title=f"{r['unit']}: missed by {miss:.0f} %", xlabel="torque, N·m", ylabel="angle, % of half range")
-    axes[0].legend(frameon=False, fontsize=8)
-    figure.text(0.01, 0.005, "Data: " + CREDIT, fontsize=6)
-    figure.tight_layout(rect=(0, 0.02, 1, 1))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="lower right", ncols=3, frameon=False, fontsize=8)
+    figure.text(0.01, 0.02, "Data: " + CREDIT, fontsize=6)
+    figure.tight_layout(rect=(0, 0.05, 1, 1))
     figure.savefig(path, dpi=110)
     plt.close(figure)
