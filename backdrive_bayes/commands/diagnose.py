@@ -59,10 +59,11 @@ def run(args) -> int:
         if sampled is not None:
             posterior, indicators = sampled
             keep_fit(posterior, indicators, folder, figures=False)
-            retire(out, sampled[1])
-        retire_figures(out, DIAGNOSIS_FIGURES)
         if not args.no_figures:
             draw_figures("diagnosis.json", folder)
+        if sampled is not None:
+            retire(out, sampled[1])
+        retire_figures(out, DIAGNOSIS_FIGURES)
     _summarise(result, sampled, out)
     return result["outcome"]["exit_code"]
 

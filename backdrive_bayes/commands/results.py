@@ -154,11 +154,9 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
 
     ``simulated`` is the unit of a simulator's answers, of which the diagnosis then says what it lacks.
     """
-    from backdrive_bayes.engine.posterior_file import as_saved
     from backdrive_bayes.gap.diagnose import diagnose
     from backdrive_bayes.gap.simulated import diagnose_simulated
-    from backdrive_bayes.indicators.convergence import convergence_json, examined
-    from backdrive_bayes.indicators.draws import IndicatorDraws
+    from backdrive_bayes.indicators.convergence import judged_convergence
 
     shared: dict = {"seed": options.seed, "k": options.k, "progress": note}
     if simulated is None:
@@ -169,8 +167,7 @@ def diagnose_unit(unit, options: FitOptions, note=lambda text: None, sample: boo
         raise BadInput("--baseline", f"{BASELINE} beside --simulated", ",".join(options.baseline))
     about = options.to_json() | ({"simulated": simulated.name} if simulated else {})
     if not sample:
-        drawn = IndicatorDraws(as_saved(found.posterior), options.k)
-        found.json["convergence"] = convergence_json(examined(drawn, unit))
+        found.json["convergence"] = judged_convergence(found.posterior, options.k, unit)
         return stamped(found.json, origin(unit), options.seed, about), None
     sampled = fit_unit(unit, options, note, found.posterior)
     found.json["convergence"] = sampled[1]["convergence"]
@@ -192,10 +189,11 @@ def keep_fit(posterior, result: dict, folder: Path, figures: bool = True, note=l
 
 def keep_decision(result: dict, name: str, out: Path, folder: Path, figures: bool) -> None:
     """Write a verdict or a comparison and its figures into ``folder``, which becomes ``out``; those of an older one go."""
-    retire_figures(out, (DECISION_FIGURES[name],))
     write_json(folder / name, result)
     if figures:
         draw_figures(name, folder)
+    # Last, so that what fails before leaves the older ones as they are.
+    retire_figures(out, (DECISION_FIGURES[name],))
 
 
 def keep_run(folder: Path, verb: str, began_s: float) -> None:

@@ -18,7 +18,7 @@ from backdrive_bayes.engine.reduced import Reduced
 from backdrive_bayes.engine.residuals import residuals
 from backdrive_bayes.engine.traces import TRACE, trace_probabilities
 from backdrive_bayes.records.branches import find_segments
-from backdrive_bayes.records.shape import loading_rate
+from backdrive_bayes.records.shape import ramp_rate
 
 RATIO = 2.0
 """Ratio of neighbouring sizes, with which the evidence of a line changes little."""
@@ -80,7 +80,7 @@ def disturbance(reduced: Reduced) -> float:
     spread = float(np.median([1.4826 * np.median(np.abs(rest)) for rest in left]))
     each = [periodogram(*one, spread) for one in zip(reduced.unit.records, reduced.blocks, left, strict=True)]
     ramps = [(record.time_s, record.torque_nm) for record in reduced.unit.records]
-    rates = [loading_rate(time, torque, find_segments(time, torque)) for time, torque in ramps]
+    rates = [ramp_rate(time, torque, find_segments(time, torque)) for time, torque in ramps]
     told = [(one, rate) for one, rate in zip(each, rates, strict=True) if one is not None and rate > 0.0]
     if not told:
         return 0.0

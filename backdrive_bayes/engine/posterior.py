@@ -10,8 +10,9 @@ import numpy as np
 from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, GrowthEffect
-from backdrive_bayes.mechanics.history import History, loading_rate, through
+from backdrive_bayes.mechanics.history import History, through
 from backdrive_bayes.mechanics.reducer import GROWING, ReducerClass
+from backdrive_bayes.records.reduction import loading_rate
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,10 @@ import numpy as np
 
 from backdrive_bayes.engine.covariance import channel_covariance, local_slope, path_covariance
 from backdrive_bayes.mechanics.effect import Context
-from backdrive_bayes.mechanics.history import loading_rate
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Unit
-from backdrive_bayes.records.reduction import Blocks, full_legs, reduce_record
+from backdrive_bayes.records.reduction import Blocks, full_legs, loading_rate, reduce_record
 
 MOST_BLOCKS, PER_LEG = 1200, (40, 120)
 """Blocks of all records together beyond which each leg gets fewer, for time grows with their square, and the fewest and the most

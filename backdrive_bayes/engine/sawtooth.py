@@ -20,7 +20,7 @@ STRAY = 1e-3
 """Share of instants at which something else moves the angle either way, by up to ``FAR`` noise standard deviations."""
 FAR = 6.0
 APART = 64
-"""Room between the rows of an array that compiled loops go through at once."""
+"""Room between the rows of an array that compiled loops go through at once: more than they take in a stride (32 numbers)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,11 +33,15 @@ def posterior_folder(out: Path, unit: FleetUnit) -> Path:
 
 def write_result(out: Path, unit: FleetUnit, stamp: dict, status: str, error: str | None, rows: list[dict]) -> None:
     """Keep what came of a unit; ``stamp`` is what it rests on."""
-    # Every row of a unit holds those of all of its records.
-    data = [digest for row in rows[:1] for digest in (row.get("data_sha256") or "").split(",") if digest]
+    data = hashes(rows[0]) if rows else []
     result = {"schema": SCHEMA, "unit": unit.name, "status": status, "error": error, "data_sha256": data, **stamp, "rows": rows}
     # Surrogates are names of files that are no Unicode: kept as escapes, which ASCII output writes.
     write_whole(result_path(out, unit), (json.dumps(result, indent=1, allow_nan=False) + "\n").encode("ascii"))
+
+
+def hashes(row: dict) -> list[str]:
+    """SHA-256 of a unit's records, of which every row of the unit holds all."""
+    return [digest for digest in (row.get("data_sha256") or "").split(",") if digest]
 
 
 def read_stored(out: Path, unit: FleetUnit) -> dict | None:

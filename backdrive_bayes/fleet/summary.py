@@ -11,7 +11,7 @@ from scipy.stats import kruskal
 
 from backdrive_bayes.decisions.loops import measured_loops
 from backdrive_bayes.fleet.drift import FALSE_ALARM, FEWEST, find_drift
-from backdrive_bayes.fleet.store import DONE, UNITS
+from backdrive_bayes.fleet.store import DONE, UNITS, hashes
 from backdrive_bayes.fleet.table import rows_of
 from backdrive_bayes.fleet.units import FleetUnit
 from backdrive_bayes.indicators.same_loop import most_alike, same_amplitude
@@ -55,7 +55,7 @@ def summarise(units: list[tuple[str, str, list[dict]]], order: str | None = None
     return {
         "schema": FLEET,
         "counts": _counts(firsts),
-        "data_sha256": [digest for first in firsts for digest in (first["data_sha256"] or "").split(",") if digest],
+        "data_sha256": [digest for first in firsts for digest in hashes(first)],
         "verdicts": _shares(rows[0].get("verdict") for _, rows in done),
         "effects": _shares(rows[0].get("answer") for _, rows in done),
         "failures": [{"unit": f["unit"], "status": f["status"], "error": f["error"]} for f in firsts if f["status"] != DONE],

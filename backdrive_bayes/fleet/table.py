@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
-from itertools import islice
+from collections.abc import Iterator
+from itertools import chain, islice
 from pathlib import Path
 
 from backdrive_bayes.errors import BadInput, MissingExtra
@@ -13,8 +13,8 @@ from backdrive_bayes.fleet.units import FleetUnit
 from backdrive_bayes.indicators.same_loop import same_amplitude
 
 NAME, RECORDS = "fleet.parquet", "records.parquet"
-ROWS = 2048
-"""Rows of one group: a few megabytes in memory."""
+UNITS_AT_ONCE = 1024
+"""Units of one group of rows: a few megabytes in memory."""
 
 
 def rows_of(out: Path, unit: FleetUnit) -> list[dict]:
@@ -28,13 +28,36 @@ def rows_of(out: Path, unit: FleetUnit) -> list[dict]:
 
 
 def compact(out: Path, units: list[FleetUnit]) -> int:
-    """Write the tables of all results in ``out``, each in one step, in order of the units; returns the number of units in them.
+    """Write both tables of all results in ``out``, each in one step, in order of the units; returns the number of units in them.
 
     A unit's row is that of its largest loop, of several as large that of the slowest. Raises BadInput where one cannot be
     written.
     """
-    _write(Path(out) / RECORDS, lambda: (row for unit in units for row in rows_of(out, unit)))
-    return _write(Path(out) / NAME, lambda: (_of_unit(rows) for unit in units if (rows := rows_of(out, unit))))
+    pa, parquet = require_pyarrow()
+    kinds: dict[str, str] = {}
+    for rows in _all(out, units):
+        for row in rows:
+            for name, value in row.items():
+                kinds[name] = _wider(kinds.get(name, "null"), value)
+    types = {"null": pa.float64(), "bool": pa.bool_(), "int": pa.int64(), "float": pa.float64(), "str": pa.string()}
+    # A column that is empty in this fleet has the type that its name tells in every other.
+    schema = pa.schema([(n, pa.string() if kind == "null" and n in TEXT else types[kind]) for n, kind in kinds.items()])
+    count, left, buffers = 0, _all(out, units), (io.BytesIO(), io.BytesIO())
+    of_unit = schema.append(pa.field("records", pa.int64()))
+    with (
+        parquet.ParquetWriter(buffers[0], schema, compression="zstd") as records,
+        parquet.ParquetWriter(buffers[1], of_unit, compression="zstd") as whole,
+    ):
+        while some := list(islice(left, UNITS_AT_ONCE)):
+            records.write_table(pa.Table.from_pylist(list(chain.from_iterable(some)), schema=schema))
+            whole.write_table(pa.Table.from_pylist([_of_unit(rows) for rows in some], schema=of_unit))
+            count += len(some)
+    for name, buffer in zip((RECORDS, NAME), buffers, strict=True):
+        try:
+            write_whole(Path(out) / name, buffer.getvalue())
+        except CannotKeep as error:
+            raise BadInput(Path(out) / name, "room for the table", f"{error}; results of units are kept") from None
+    return count
 
 
 def _of_unit(rows: list[dict]) -> dict:
@@ -45,26 +68,8 @@ def _of_unit(rows: list[dict]) -> dict:
     return min(wide, key=lambda row: row["loading_rate_Nm_per_s"], default=rows[0]) | {"records": len(records)}
 
 
-def _write(path: Path, rows: Callable[[], Iterator[dict]]) -> int:
-    pa, parquet = require_pyarrow()
-    kinds: dict[str, str] = {}
-    for row in rows():
-        for name, value in row.items():
-            kinds[name] = _wider(kinds.get(name, "null"), value)
-    types = {"null": pa.float64(), "bool": pa.bool_(), "int": pa.int64(), "float": pa.float64(), "str": pa.string()}
-    # A column that is empty in this fleet has the type that its name tells in every other.
-    schema = pa.schema([(n, pa.string() if kind == "null" and n in TEXT else types[kind]) for n, kind in kinds.items()])
-    count, buffer = 0, io.BytesIO()
-    with parquet.ParquetWriter(buffer, schema, compression="zstd") as writer:
-        left = rows()
-        while some := list(islice(left, ROWS)):
-            writer.write_table(pa.Table.from_pylist(some, schema=schema))
-            count += len(some)
-    try:
-        write_whole(path, buffer.getvalue())
-    except CannotKeep as error:
-        raise BadInput(path, "room for the table", f"{error}; results of units are kept") from None
-    return count
+def _all(out, units) -> Iterator[list[dict]]:
+    return (rows for unit in units if (rows := rows_of(out, unit)))
 
 
 TEXT = ("error", "serial", "batch", "test_date", "file", "effects", "answer", "credible_set_90", "verdict", "reason", "limiting")

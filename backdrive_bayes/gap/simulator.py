@@ -18,11 +18,10 @@ from backdrive_bayes.gap.averaged import posterior_of
 from backdrive_bayes.gap.hypotheses import weigh
 from backdrive_bayes.gap.properties import find_properties
 from backdrive_bayes.indicators.same_loop import same_rate
-from backdrive_bayes.mechanics.history import loading_rate
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
-from backdrive_bayes.records.reduction import Blocks
+from backdrive_bayes.records.reduction import Blocks, loading_rate
 
 FINE = 400
 """Blocks a leg in which a simulator's own angle is taken along a path that it was asked."""

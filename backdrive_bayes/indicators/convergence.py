@@ -9,6 +9,7 @@ from scipy.integrate import trapezoid
 
 from backdrive_bayes.engine.diagnostics import diagnose_draws
 from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.engine.posterior_file import as_saved
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
 from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad
 from backdrive_bayes.indicators.intervals import ends
@@ -18,6 +19,8 @@ from backdrive_bayes.records.measured_loop import MeasuredLoop, measured_loops
 from backdrive_bayes.records.record import Unit
 
 LEVEL, STANDARD_ERRORS = 0.9, 3.0
+"""Level of the interval that is held against a measured value, whatever level is shown, and by how many of the value's standard
+errors it is widened."""
 SHARE = {"settled": 0.05, "first": 0.3}
 """Share of a measured value by which the interval is widened; a cycle from rest is not the settled loop."""
 
@@ -50,7 +53,7 @@ def examined(draws: IndicatorDraws, unit: Unit | None = None) -> Posterior:
     return replace(posterior, convergence=posterior.convergence.joined(own), doubts=doubts)
 
 
-def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, ...], level: float = LEVEL) -> list[str]:
+def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, ...]) -> list[str]:
     """One sentence for every measured number that the posterior's interval does not hold, with both numbers."""
     found = []
     for record, loop in enumerate(measured):
@@ -61,7 +64,7 @@ def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, .
             value = getattr(loop, name)
             if value is None:
                 continue
-            lo, hi = np.quantile(function(loops, loop), ends(level)[::2])
+            lo, hi = np.quantile(function(loops, loop), ends(LEVEL)[::2])
             room = STANDARD_ERRORS * getattr(loop, f"{name}_sd") + SHARE[loop.basis] * abs(value)
             if not lo - room <= value <= hi + room:
                 inferred = f"inferred as {lo:.4g} to {hi:.4g} {unit}"
@@ -73,7 +76,7 @@ def _reached(draws, record) -> Loops:
     """The loop between the torques that were reached, which may miss the declared amplitude and lie off centre."""
     posterior, blocks, rate = draws.posterior, draws.posterior.records.blocks[record], draws.rates[record]
     low, high = blocks.tips_nm
-    if same_amplitude(-low, high):
+    if high > 0.0 and same_amplitude(-low, high):
         return draws.loops(rate, blocks.amplitude_nm)
     grid = loop_grid(posterior, max(-low, high))
     return settled_loops(posterior, np.r_[low, grid[(grid > low) & (grid < high)], high], rate)
@@ -83,6 +86,11 @@ def _lag_nm(draws, record):
     """By how much of the torque the angle channel is late in a record: it widens what was measured, not the reducer's loop."""
     lag = draws.posterior.flat.get("sensor_lag")
     return float(np.median(lag) if lag is not None else draws.posterior.distortion.lag_s) * draws.rates[record]
+
+
+def judged_convergence(posterior: Posterior, k: float, unit: Unit) -> dict:
+    """The ``convergence`` object of a posterior of a unit, as it will be saved, lost motion at ``k`` T_r."""
+    return convergence_json(examined(IndicatorDraws(as_saved(posterior), k), unit))
 
 
 def convergence_json(posterior: Posterior) -> dict:

@@ -8,12 +8,10 @@ from functools import cached_property
 import numba
 import numpy as np
 
-from backdrive_bayes.records.reduction import FEW, Blocks
+from backdrive_bayes.records.reduction import FEW, RESTING, Blocks, loading_rate
 
 FILM = 0.03
 """Torque, in shares of the largest, that passes at the usual rate while a film of lubricant takes on a new speed."""
-RESTING = 0.05
-"""Rate, in shares of the usual one, below which the torque rests and a film stays as it is."""
 LEAST_RANGE = 0.05
 """Range of a logarithm of rate or amplitude, and of what a law makes of it, below which it counts as one value: nothing is learnt
 of the law from it."""
@@ -107,44 +105,6 @@ def through(time_s, torque_nm, torque_scale_nm: float, usual_nm_per_s: float | N
     usual = loading_rate(time, z) if usual_nm_per_s is None else usual_nm_per_s / torque_scale_nm
     surge = _surge(time, z, np.stack([time[:-1], time[1:]]), usual)
     return History(z[:-1], z[1:], time[:-1], time[1:], np.arange(count), np.ones(count), count, surge)
-
-
-def loading_rate(time_s, torque) -> float:
-    """Mean rate of a path that is straight between instants [s], without its rests where it turns, begins or ends [its unit a
-    second]: what passes at less than RESTING of it, less than FILM of the range away from there. Zero where the torque never
-    moves."""
-    torque = np.asarray(torque, float)
-    way, spans, least = np.diff(torque), np.diff(time_s), FILM * float(np.ptp(torque))
-    if least == 0.0:
-        return 0.0
-    turns = _turns(torque, least)
-    leg = np.searchsorted(turns, np.arange(way.size), side="right") - 1
-    middle = 0.5 * (torque[1:] + torque[:-1])
-    near = np.minimum(np.abs(middle - torque[turns[leg]]), np.abs(middle - torque[turns[leg + 1]])) < least
-    rests = near & (way == 0.0)
-    while True:
-        rate = float(np.abs(way[~rests]).sum() / max(spans[~rests].sum(), 1e-300))
-        more = rests | (near & (np.abs(way) < RESTING * rate * spans))
-        if np.array_equal(more, rests):
-            return rate
-        rests = more
-
-
-@numba.njit(cache=True, nogil=True)
-def _turns(torque, least):
-    """Numbers of the points at which a path turns by more than ``least``, the first and the last among them."""
-    found, high, low, way = [0], 0, 0, 0
-    for i in range(1, torque.size):
-        high = i if torque[i] > torque[high] else high
-        low = i if torque[i] < torque[low] else low
-        if way >= 0 and torque[high] - torque[i] > least:
-            found.append(high)
-            way, low = -1, i
-        elif way <= 0 and torque[i] - torque[low] > least:
-            found.append(low)
-            way, high = 1, i
-    found.append(torque.size - 1)
-    return np.array(found)
 
 
 def _bends(time_s, z, usual: float) -> np.ndarray:

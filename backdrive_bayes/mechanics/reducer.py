@@ -26,7 +26,8 @@ EVERY = ("compliance", "elastic", *FRICTION, "clearance", "free_play")
 GROWING = (FRICTION, ("clearance",), EVERY)
 """Parts whose thresholds follow the rate and the amplitude: of friction, and drags; and those behind a drag at the shaft."""
 SHIFTS = 7
-"""Growths of the draws at which responses are made, those between are interpolated: their quantiles, from least to largest."""
+"""Growths of the draws at which responses are made, those between are interpolated: their quantiles, from least to largest, the
+inner ones half a standard deviation apart."""
 UNGROWN = (0.0, 0.0, 0.0)
 """Growth where nothing grows."""
 GROWTH_STEPS = (2e-3, 2e-3, 2e-5)

@@ -25,7 +25,7 @@ from backdrive_bayes.records.messages import judge_record
 from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
 from backdrive_bayes.records.plausible import why_unfinished
 from backdrive_bayes.records.record import Record, Unit
-from backdrive_bayes.records.shape import closure, cycle_count, extremes, loading_rate
+from backdrive_bayes.records.shape import closure, cycle_count, extremes, ramp_rate
 from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy
 from backdrive_bayes.results import CHECK
 
@@ -92,7 +92,7 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
         "cycles": int(cycle_count(time, torque, segments) + 0.05),
         "torque_range_Nm": [low, high],
         "amplitude_Nm": {"estimated": 0.5 * (high - low), "declared": record.amplitude_nm},
-        "loading_rate_Nm_per_s": {"estimated": loading_rate(time, torque, segments), "declared": record.loading_rate_nm_per_s},
+        "loading_rate_Nm_per_s": {"estimated": ramp_rate(time, torque, segments), "declared": record.loading_rate_nm_per_s},
         "closure": closure(time, torque, angle, branches, noise),
         "noise": _si_names(asdict(noise)),
         "angle_rise": rise,

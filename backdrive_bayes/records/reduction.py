@@ -8,17 +8,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from backdrive_bayes.records.faults import gaps_after
 from backdrive_bayes.records.noise import NoiseEstimate
 from backdrive_bayes.records.record import Record
 from backdrive_bayes.records.torque_path import follow_torque
+from backdrive_bayes.records.turning import zigzag
 
 SAME_TIP = 0.05
 """Turning points that differ by less, in shares of the largest torque, are of the same tips."""
 AT_TIP = 0.9
 """Share of the largest torque from which on a record begins at a tip."""
+RESTING, AT_TURN = 0.05, 0.03
+"""Rate, in shares of the usual one, below which the torque rests and a film of lubricant stays as it is; and how near to a turn of
+the path, in shares of its range, a rest is one at a tip: as much as passes while a film takes on a new speed."""
 SHORTEST = 0.1
 """Share of a full leg's blocks that even the shortest leg gets."""
 LONG_GAP = 0.25
@@ -88,6 +93,31 @@ class Blocks:
         half = 0.5 * (self.end_s - self.begin_s)[[0, -1]] / self.count[[0, -1]]
         inside = np.clip([self.begin_s, self.end_s], self.begin_s[0] + half[0], self.end_s[-1] - half[1])
         return np.interp(inside, self.path_s, self.path_nm)
+
+
+_zigzag = numba.njit(cache=True, nogil=True)(zigzag)
+"""The search for turning points, compiled: paths are gone through again and again."""
+
+
+def loading_rate(time_s, torque) -> float:
+    """Mean rate of a path that is straight between instants [s], without its rests where it turns, begins or ends [its unit a
+    second]: what passes at less than RESTING of it, less than AT_TURN of the range away from there. Zero where the torque never
+    moves."""
+    torque = np.asarray(torque, float)
+    way, spans, least = np.diff(torque), np.diff(time_s), AT_TURN * float(np.ptp(torque))
+    if least == 0.0:
+        return 0.0
+    turns = np.r_[0, np.array(_zigzag(torque, least), int), torque.size - 1]
+    leg = np.searchsorted(turns, np.arange(way.size), side="right") - 1
+    middle = 0.5 * (torque[1:] + torque[:-1])
+    near = np.minimum(np.abs(middle - torque[turns[leg]]), np.abs(middle - torque[turns[leg + 1]])) < least
+    rests = near & (way == 0.0)
+    while True:
+        rate = float(np.abs(way[~rests]).sum() / max(spans[~rests].sum(), 1e-300))
+        more = rests | (near & (np.abs(way) < RESTING * rate * spans))
+        if np.array_equal(more, rests):
+            return rate
+        rests = more
 
 
 def full_legs(record: Record, segments) -> float:

@@ -62,7 +62,7 @@ def extremes(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment,
     )
 
 
-def loading_rate(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
+def ramp_rate(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
     """Median rate in N·m/s of the segments' middle parts, each weighted by its length."""
     rates, weights = [], []
     for segment in segments:

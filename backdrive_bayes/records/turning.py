@@ -32,7 +32,7 @@ def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
     block = max(1, _segment_length(smooth, span) // _BLOCKS_PER_SEGMENT)
     blocks = median_filter(block_means(torque_nm, block), _MEDIAN_BLOCKS if block > 1 else 5, mode="nearest")
     threshold = max(SHARE * float(np.ptp(blocks)), _NOISE_MULTIPLE * noise / np.sqrt(block))
-    return [k * block + block // 2 for k in _zigzag(blocks.tolist(), threshold)]
+    return [k * block + block // 2 for k in zigzag(blocks.tolist(), threshold)]
 
 
 def refine_turning_point(time_s: np.ndarray, torque_nm: np.ndarray, left: int, turn: int, right: int) -> int:
@@ -88,7 +88,7 @@ def _smoothed(torque: np.ndarray) -> tuple[np.ndarray, int]:
 def _segment_length(smooth: np.ndarray, span: float) -> int:
     """Length in samples of a typical segment: a tenth of the record lies in shorter ones."""
     step = max(1, len(smooth) // 20_000)
-    turns = [step * k for k in _zigzag(smooth[::step].tolist(), _MAIN_SHARE * span)]
+    turns = [step * k for k in zigzag(smooth[::step].tolist(), _MAIN_SHARE * span)]
     lengths = np.sort(np.diff([0, *turns, len(smooth)]))
     return int(lengths[np.searchsorted(np.cumsum(lengths), 0.1 * len(smooth))])
 
@@ -99,21 +99,24 @@ def block_means(values: np.ndarray, block: int) -> np.ndarray:
     return values[: count * block].reshape(count, -1).mean(axis=1)
 
 
-def _zigzag(levels: list[float], threshold: float) -> list[int]:
-    """Indices of the extremes from which the signal comes back by at least ``threshold``."""
+def zigzag(levels, threshold: float) -> list[int]:
+    """Indices of the extremes from which the signal comes back by at least ``threshold``; written so that it can be compiled."""
     turns: list[int] = []
     low = high = 0
     direction = 0
-    for k, level in enumerate(levels):
+    for k in range(len(levels)):
+        level = levels[k]
         if level > levels[high]:
             high = k
         if level < levels[low]:
             low = k
         if direction >= 0 and level <= levels[high] - threshold:
-            turns += [high] if direction else []
+            if direction != 0:
+                turns.append(high)
             direction, low = -1, k
         elif direction <= 0 and level >= levels[low] + threshold:
-            turns += [low] if direction else []
+            if direction != 0:
+                turns.append(low)
             direction, high = 1, k
         if direction > 0:
             low = k

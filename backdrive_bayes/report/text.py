@@ -8,6 +8,7 @@ import unicodedata
 LONGEST = 240
 DIGITS = 12
 UNBREAKABLE, PIECE = 16, 12
+"""Letters from which on a word may be broken, and of a piece of it at most: so many have room in the narrowest column."""
 BREAK = "\u200b"
 LOW, END = "\ue000", "\ue001"
 """Marks around an index; free text cannot hold them, because :func:`printable` spells them out."""

@@ -13,8 +13,8 @@ from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.gap import examine, next_test, where
 from backdrive_bayes.gap.averaged import weighed_unit
 from backdrive_bayes.gap.shrink import Shrink, _alone, closed_fraction, fit_hypothesis, shrink, within_reach
-from backdrive_bayes.mechanics.history import loading_rate
 from backdrive_bayes.mechanics.registry import library_terms
+from backdrive_bayes.records.reduction import loading_rate
 
 
 @cache

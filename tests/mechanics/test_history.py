@@ -8,8 +8,8 @@ from support.planted import by_hand, smooth_reducer
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.mechanics import history as module
 from backdrive_bayes.mechanics.friction import FRICTION
-from backdrive_bayes.mechanics.history import loading_rate, of_blocks, through
-from backdrive_bayes.records.reduction import Blocks
+from backdrive_bayes.mechanics.history import of_blocks, through
+from backdrive_bayes.records.reduction import Blocks, loading_rate
 
 SCALE, RATE = 0.1, 0.05
 TURNING = np.array([0.0, 0.1, -0.1, 0.1])
