@@ -22,8 +22,8 @@ SAME_TIP = 0.05
 AT_TIP = 0.9
 """Share of the largest torque from which on a record begins at a tip."""
 RESTING, AT_TURN = 0.05, 0.03
-"""Rate, in shares of the usual one, below which the torque rests and a film of lubricant stays as it is; and how near to a turn of
-the path, in shares of its range, a rest is one at a tip: as much as passes while a film takes on a new speed."""
+"""Rate, in shares of the usual one, below which the torque rests and a film of lubricant stays as it is; and how near to a turn
+of the path, in shares of its range, a rest is one at a tip: as much as passes while a film takes on a new speed."""
 SHORTEST = 0.1
 """Share of a full leg's blocks that even the shortest leg gets."""
 LONG_GAP = 0.25
