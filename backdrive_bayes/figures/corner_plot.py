@@ -13,10 +13,10 @@ from backdrive_bayes.figures.style import (
     BLUE,
     WIDTH_IN,
     MaxNLocator,
-    display_unit,
     moved,
     new_figure,
     numbers,
+    shown_unit,
     size_in,
     styled,
     two_lines,
@@ -45,11 +45,9 @@ def shared_parameters(saved: Saved) -> dict[str, tuple[np.ndarray, str]]:
     posterior, out = saved.group("posterior"), {}
     for name, about in saved.indicators["parameters"].items():
         if name in posterior and posterior[name].dims == ("chain", "draw"):
-            factor, unit = display_unit(about["unit"])
-            values = posterior[name].values * factor
-            if unit == "N·m" and np.quantile(np.abs(values), 0.95) < 0.1:
-                values, unit = values * 1e3, "mN·m"
-            out[name] = values, unit
+            values = posterior[name].values
+            factor, unit = shown_unit(about["unit"], [np.quantile(np.abs(values), 0.95)])
+            out[name] = values * factor, unit
     return out
 
 

@@ -75,7 +75,8 @@ def _units(chosen):
     for axes, quantity in zip(figure.subplots(1, len(chosen), sharey=True, squeeze=False)[0], chosen, strict=True):
         _panel(axes, quantity, order)
     first = figure.axes[0]
-    first.set_yticks(range(len(order)), list(drawn_names(order, 18).values()))
+    shown = drawn_names(order, 18)
+    first.set_yticks(range(len(order)), [shown[name] for name in order])
     first.tick_params(axis="y", length=0, labelsize=7)
     first.set_ylim(len(order) - 0.4, -0.6)
     legend_below(figure, *figure.axes, columns=5)
