@@ -7,7 +7,7 @@ from _options import options
 
 from backdrive_bayes import accept, fit
 
-given = options("data/reducer-1", out="batch")
+given = options(*(f"data/fleet/spring/unit-{number:02d}" for number in range(1, 7)), out="batch")
 first, *sisters = [fit(unit, seed=1) for unit in given.units]
 
 verdict = accept(first, given.limits, batch=sisters)

@@ -21,8 +21,8 @@ SIMULATED = """## Simulated batches
 
 `python studies/batch_pooling.py --batches {batches}`: {batches} batches a line, 1600 posterior draws a unit. Every other
 likelihood is skewed, units differ in precision by a factor of four, and priors are displaced by their own width. The spread is
-given in a unit's usual standard deviation. Numbers are shares of 90 % intervals that hold the truth; 99 % binomial bounds are
-{low:.3f} – {high:.3f}.
+given in a unit's usual standard deviation. Numbers are shares of 90 % intervals that hold the truth; 99 % binomial bounds, of
+as many batches as were not refused, are {low:.3f} – {high:.3f} at the widest.
 
 Mean and spread keep to the lower bound in {held} of {lines} lines. Above the upper bound are batches of five units, and spreads
 that cannot be told from none: intervals are too wide there, not too narrow.
@@ -51,7 +51,7 @@ def table(columns, rows) -> list[str]:
 def coverage_lines(cells: list[dict]) -> list[str]:
     """Simulated batches, sound and with planted faults."""
     sound, faulty = ([c for c in cells if (c["fault"] == "none") == kind] for kind in (True, False))
-    low, high = sound[0]["bounds"]
+    low, high = min(c["bounds"][0] for c in sound), max(c["bounds"][1] for c in sound)
     held = sum(c["holds"] for c in sound)
     text = SIMULATED.format(batches=sound[0]["batches"], low=low, high=high, held=held, lines=len(sound))
     found = [f"{c['fault']}, {c['units']} units, spread {c['ratio']:g}: {_shares(c)}" for c in faulty]

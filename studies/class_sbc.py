@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from calibration import RANKS, draw_ranks
 from scipy.stats import binom, chisquare
 from threadpoolctl import threadpool_limits
 
@@ -39,6 +38,7 @@ HOME = Path(__file__).parents[1] / "reports" / "class-sbc"
 LOOPS = ((0.1, 0.02), (0.1, 0.1))
 """Amplitude [N·m] and rate [N·m/s] of the template's records."""
 LOST_MOTION_AT = 0.03
+RANKS = 99
 LEVELS = (0.5, 0.8, 0.9, 0.95)
 TENTHS = 10
 REJECTED = 0.01
@@ -130,7 +130,32 @@ def summarise(results, label: str) -> dict:
     ordered = sorted(table, key=lambda name: table[name]["p"])
     for k, name in enumerate(ordered):
         table[name]["rejected"] = all(table[m]["p"] < REJECTED / (len(table) - i) for i, m in enumerate(ordered[: k + 1]))
-    return {"converged": n, "quantities": table, "rejected": sum(t["rejected"] for t in table.values())}
+    return {"units": n, "quantities": table, "rejected": sum(t["rejected"] for t in table.values())}
+
+
+def draw_ranks(summary, path):
+    """Rank histograms of every quantity with the 99 % band of a uniform."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    table = summary["quantities"]
+    columns = 6
+    rows = -(-len(table) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(2.3 * columns, 1.6 * rows), sharex=True, sharey=True)
+    lo, hi = binom.interval(0.99, summary["units"], 0.1)
+    for axis in axes.ravel()[len(table) :]:
+        axis.set_visible(False)
+    for axis, (name, row) in zip(axes.ravel(), table.items(), strict=False):
+        axis.axhspan(lo, hi, color="0.85")
+        axis.bar(np.arange(10) + 0.5, row["rank_histogram"], width=1, color="#0072B2", edgecolor="white")
+        axis.set_title(f"{name.replace('_', ' ')}\n{row['share']:.0%} covered", fontsize=8)
+        axis.tick_params(labelsize=8)
+    figure.supxlabel("rank of the truth among 99 draws, in tenths (grey: 99 % band of a calibrated posterior)", fontsize=9)
+    figure.supylabel("units", fontsize=9)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
 
 
 def page(results, seconds: float) -> str:

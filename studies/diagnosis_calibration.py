@@ -76,13 +76,16 @@ POSITIVE = ("cool", "warm", "spread")
 """Numbers that are searched on a logarithmic scale."""
 
 
+def about(truth: dict) -> dict:
+    """What a row says of the truth."""
+    answer = sorted({"unknown" if e.startswith("x_") else e for e in truth["effects"]})
+    return {"answer": answer, "effects": truth["effects"], "severity": truth["size"]}
+
+
 def weigh_unit(folder: Path, truth: dict) -> dict:
     """What a diagnosis rests on for one unit, ready for JSON, with the answer that is right."""
     found = examine(read_unit(folder))
-    return {
-        "answer": sorted({"unknown" if e.startswith("x_") else e for e in truth["effects"]}),
-        "effects": truth["effects"],
-        "severity": truth["size"],
+    return about(truth) | {
         "log_factor": {"+".join(h): round(v, 2) for h, v in found.weighed.log_factor.items()},
         "leaps": {"+".join(h): round(v, 2) for h, v in found.weighed.leaps.items()},
         "disturbance": round(found.weighed.disturbance, 2),
@@ -104,7 +107,7 @@ def run_weigh(args) -> None:
             try:
                 rows[case] = job.result()
             except Exception as error:  # a unit that cannot be read is a row with its error, and counts as missed
-                rows[case] = {"error": repr(error)[:200], "answer": sorted(key[case]["effects"]), "effects": key[case]["effects"]}
+                rows[case] = about(key[case]) | {"error": repr(error)[:200]}
             print(case, "+".join(rows[case]["answer"]) or "none", flush=True)
     home = HOME / "fresh" if args.fresh else HOME
     home.mkdir(parents=True, exist_ok=True)

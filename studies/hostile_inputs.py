@@ -127,7 +127,7 @@ def run_fuzz(room: Path, count: int, seed: int, note) -> list[dict]:
         name = names[number % len(names)]
         folder = _clean(room / "fuzz")
         data = mutated(name, sound[name], np.random.default_rng([seed, number]))
-        outcome = run(_arguments(name, data, folder), folder)
+        outcome = run(_arguments(name, data, folder, sound["posterior.nc"]), folder)
         faults = outcome.faults()
         rows.append(_row(f"{number} {name}", outcome, faults, {"format": name}))
         if faults:
@@ -142,7 +142,8 @@ def run_fuzz(room: Path, count: int, seed: int, note) -> list[dict]:
 def _sound(folder: Path) -> dict[str, bytes]:
     columns = loop(samples_per_ramp=120)
     found = {name: write(folder / name, *columns).read_bytes() for name in FORMATS}
-    found["history.csv"] = found["plain.csv"]
+    lines = (f"{i},{0.4 * np.sin(i / 30):.6f}" for i in range(200))
+    found["history.csv"] = "\n".join(["time_s,torque_Nm", *lines, ""]).encode()
     from backdrive_bayes.commands.main import main
 
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
@@ -151,7 +152,8 @@ def _sound(folder: Path) -> dict[str, bytes]:
     return found | {name: text.replace("{file}", "a.csv").encode() for name, text in TEXTS.items()}
 
 
-def _arguments(name: str, data: bytes, folder: Path) -> list[str]:
+def _arguments(name: str, data: bytes, folder: Path, posterior: bytes) -> list[str]:
+    """A command that opens the input: no sound posterior hides a history, other texts are read first."""
     (folder / name).write_bytes(data)
     out = ["-o", str(folder / "out")]
     if name == "limits.toml":
@@ -161,7 +163,8 @@ def _arguments(name: str, data: bytes, folder: Path) -> list[str]:
     if name == "template.toml":
         return ["report", str(folder / "none"), "--template", str(folder), *out]
     if name == "history.csv":
-        return ["predict", str(folder / "none.nc"), str(folder / name), *out]
+        (folder / "sound.nc").write_bytes(posterior)
+        return ["predict", str(folder / "sound.nc"), str(folder / name), *out]
     if name == "posterior.nc":
         (folder / "history.csv").write_text("time_s,torque_Nm\n0,0\n1,0.5\n2,0\n")
         return ["predict", str(folder / name), str(folder / "history.csv"), *out]

@@ -25,7 +25,8 @@ Every verb is started and killed at a random moment of the time that it needs un
 last left alone. A round fails where a signal leaves a result file that is not whole, where Ctrl-C or SIGTERM say more than one
 line or end with another code than 130 and 143, where the last run does not end with the code and the bytes of the undisturbed
 one (run.json apart), or where a `.part` file is left. "Late" are signals that came after the end, beside the others;
-what Python itself says to a signal before the package's first line runs is not counted.
+what Python itself says to a signal before the package's first line runs, within the {boot:.1f} s that `--version` takes, is not
+counted.
 
 """
 
@@ -52,8 +53,9 @@ def main():
     signal.signal(signal.SIGINT, signal.default_int_handler)
     rng, rows = np.random.default_rng(options.seed), []
     with tempfile.TemporaryDirectory(prefix="kills-") as room:
+        boot = max(_boot_seconds() for _ in range(3))
         for verb in _verbs(Path(room)):
-            rows.append(_round(verb, Path(room), options.kills, rng))
+            rows.append(_round(verb, Path(room), options.kills, rng, boot))
             print(rows[-1], flush=True)
     lines = ["| verb | undisturbed | SIGKILL | SIGINT | SIGTERM | late | faults |", "|---|--:|--:|--:|--:|--:|---|"]
     for row in rows:
@@ -62,7 +64,7 @@ def main():
         lines.append(f"| {row['verb']} | {row['seconds']:.1f} s | {sent} | {row['late']} | {faults} |")
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
-        head = HEAD.format(kills=options.kills, seed=options.seed)
+        head = HEAD.format(kills=options.kills, seed=options.seed, boot=boot)
         (options.out / "README.md").write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
     raise SystemExit(any(row["faults"] for row in rows))
 
@@ -80,7 +82,13 @@ def _verbs(room: Path):
     yield Verb("report", ["report", str(room / "fit-still")])
 
 
-def _round(verb: Verb, room: Path, kills: int, rng) -> dict:
+def _boot_seconds() -> float:
+    began = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "backdrive_bayes", "--version"], stdout=subprocess.DEVNULL, check=True)
+    return time.perf_counter() - began
+
+
+def _round(verb: Verb, room: Path, kills: int, rng, boot: float) -> dict:
     still = room / f"{verb.name}-still"
     began = time.perf_counter()
     verb.code = _start(verb, still, room).wait()
@@ -94,13 +102,15 @@ def _round(verb: Verb, room: Path, kills: int, rng) -> dict:
             break
         number = list(SIGNALS)[sent % len(SIGNALS)]
         process = _start(verb, out, room)
-        time.sleep(float(rng.uniform(0.0, verb.seconds)))
+        after = float(rng.uniform(0.0, verb.seconds))
+        time.sleep(after)
         late = process.poll() is not None
         if not late:
             process.send_signal(number)
         said, code = process.communicate()[1], process.returncode
         row["late" if late or code == verb.code else number] += 1
-        row["faults"] += _faults(verb, number, code, said, out, late)
+        unheard = number == signal.SIGKILL or late or code == verb.code or after < boot
+        row["faults"] += _half(out, verb) + ([] if unheard else _faults(number, code, said))
     code = _start(verb, out, room).wait()
     found = _files(out)
     row["faults"] += [f"code {code} in the end"] if code != verb.code else []
@@ -114,22 +124,17 @@ def _start(verb: Verb, out: Path, room: Path) -> subprocess.Popen:
     return subprocess.Popen(command, cwd=room, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
-def _faults(verb, number, code, said, out, late) -> list[str]:
-    """What a signal must not cause; before the package's first line runs, Python itself answers Ctrl-C and SIGTERM."""
-    if number == signal.SIGKILL or late or code == verb.code:
-        return _half(out, verb)
-    lines = [line for line in said.split("\n") if line.startswith("backdrive-bayes:")]
-    booted = bool(lines)
-    faults = [f"{signal.Signals(number).name}: a traceback"] if booted and "Traceback" in said else []
-    faults += [f"{signal.Signals(number).name}: {len(lines)} lines"] if len(lines) > 1 else []
-    faults += [f"{signal.Signals(number).name}: code {code}"] if booted and code != SIGNALS[number] else []
-    return faults + _half(out, verb)
+def _faults(number, code: int, said: str) -> list[str]:
+    """What a signal must not cause once the package runs."""
+    name, lines = signal.Signals(number).name, [line for line in said.split("\n") if line.startswith("backdrive-bayes:")]
+    faults = [f"{name}: a traceback"] if "Traceback" in said else []
+    faults += [f"{name}: {len(lines)} lines"] if len(lines) > 1 else []
+    return faults + ([f"{name}: code {code}"] if code != SIGNALS[number] else [])
 
 
 def _half(out: Path, verb: Verb) -> list[str]:
     """Files that are there but not whole."""
-    found = _files(out)
-    return [f"{name} half-written" for name, data in found.items() if verb.files.get(name) != data and name.endswith(".json")]
+    return [f"{name} half-written" for name, data in _files(out).items() if verb.files.get(name) != data]
 
 
 def _files(out: Path) -> dict[str, bytes]:

@@ -99,8 +99,8 @@ def trends(results) -> list[dict]:
             row: dict = {"from": low, "to": high}
             for name, sign in zip(PARAMETERS, (-1, 1, 1), strict=True):
                 a, b = (np.array(by_name[u]["draws"][name]) for u in (low, high))
-                n = min(a.size, b.size)
-                row[f"P({name} {'rises' if sign > 0 else 'falls'})"] = float(np.mean(sign * (b[:n] - a[:n]) > 0))
+                # All pairs: fits of one seed share their random numbers draw by draw.
+                row[f"P({name} {'rises' if sign > 0 else 'falls'})"] = float(np.mean(sign * (b[:, None] - a) > 0))
                 row[f"median {name}"] = [float(np.median(a)), float(np.median(b))]
             for name, sign in (("zero_torque_width_rad", -1), ("loop_area_J", 1)):
                 row[f"P({name} {'rises' if sign > 0 else 'falls'}), loops"] = _loop_trend(by_name[low], by_name[high], name, sign)

@@ -32,8 +32,8 @@ HEAD = """# Versions
 
 The wheel, built from the sources and installed into new environments with the extras {extras}; the tests run beside it in a
 folder without the sources. "Lowest" holds every dependency that pyproject.toml names at its lowest release series, "newest" takes
-what is offered. A subset of the tests: {subset}. The last column is `check`, `fit` and `report` of a packaged unit by the
-installed command in an empty folder.
+what is offered. A subset of the tests: {subset}. The last column is `check`, `fit` and `report` of a packaged unit, and
+the demo, by the installed command in an empty folder.
 
 """
 

@@ -73,7 +73,8 @@ def _summarise(result: dict, sampled, out: Path) -> None:
     simulator = result.get("simulator")
     if not result["inconclusive"]:
         lead, nothing = ("missing in the simulator", "nothing that is listed") if simulator else ("answer", "no gap")
-        say(f"a gap is there with probability {probability_text(result['gap']['probability'])}: {result['where']['summary']}")
+        where = f": {result['where']['summary']}" if result["answer"]["effects"] or (simulator and simulator["told"]) else ""
+        say(f"a gap is there with probability {probability_text(result['gap']['probability'])}{where}")
         say(f"{lead}: {' + '.join(result['answer']['effects']).replace('_', ' ') or nothing}")
         show_which(result)
         say(f"something that is not listed acts with probability {probability_text(result['gap']['unlisted_probability'])}")

@@ -86,9 +86,11 @@ def _job(args, out: Path):
 
 
 def _pools(args, job, units, found, client) -> list[Path]:
+    from backdrive_bayes.commands.fleet_pool import pool_fleet, retire_pools
+
+    retire_pools(job.out)
     if not args.pool:
         return []
-    from backdrive_bayes.commands.fleet_pool import pool_fleet
 
     with progress() as note:
         return pool_fleet(job, units, found, client, args.level, not args.no_figures, note)

@@ -29,12 +29,16 @@ def read_draws(folder: Path, name: str, seed: int):
     return unit_draws(Evidence.read(folder), name, seed)
 
 
+def retire_pools(out: Path) -> None:
+    """Take away the pools of an earlier run: its units may be others."""
+    shutil.rmtree(out / POOLS, ignore_errors=True)
+
+
 def pool_fleet(job: Job, units: list[FleetUnit], found: list, client, level: float, figures: bool, note: Callable) -> list[Path]:
     """Pool the batches of a fleet's ``units``, whose table rows ``found`` holds, and return the folders written.
 
-    Pools of before are gone. A batch with too few units that can be pooled is said and left out.
+    A batch with too few units that can be pooled is said and left out.
     """
-    shutil.rmtree(job.out / POOLS, ignore_errors=True)
     batches = defaultdict(list)
     for unit, (_, _, rows) in zip(units, found, strict=True):
         if rows[0]["status"] == DONE:

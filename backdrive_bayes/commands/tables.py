@@ -138,7 +138,7 @@ def show_simulator(found: dict, level: float) -> None:
         unit, factor = ("′", ARCMIN_PER_RAD) if row["unit"] == "rad" else _in_prefix(row["unit"], size)
         own = like_interval(row["simulated"], row["simulated_interval"], factor)
         moved = "changed" if row["credible"] else ""
-        rows.append([f"{row['name'].rpartition('_')[0] or row['name']} {f'[{unit}]' if unit else ''}", own,
+        rows.append([f"{words(row['name'])} {f'[{unit}]' if unit else ''}", own,
                      _cell(row["measured"], factor), moved])  # fmt: skip
     columns = [Column("parameter", False, 20), Column("simulator"), Column("unit"), Column("", False)]
     show_table(columns, rows, f"Median, of the unit with its {level_text(level)} interval")

@@ -98,12 +98,13 @@ def _bell(start, step, out):
         top = int(min(max(np.rint(-start / step), 0.0), out.size - 1.0))
     x, fall = start + step * top, np.exp(-step * step)
     out[top] = np.exp(-0.5 * x * x)
-    value, factor = out[top], np.exp(-x * step) * np.sqrt(fall)
+    # One exponential: of the largest on, none of its factors exceeds one.
+    value, factor = out[top], np.exp(-(x + 0.5 * step) * step)
     for k in range(top + 1, out.size):
         value *= factor
         factor *= fall
         out[k] = value
-    value, factor = out[top], np.exp(x * step) * np.sqrt(fall)
+    value, factor = out[top], np.exp((x - 0.5 * step) * step)
     for k in range(top - 1, -1, -1):
         value *= factor
         factor *= fall

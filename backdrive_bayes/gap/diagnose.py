@@ -101,7 +101,7 @@ def _records(found: Found):
 def _where(found: Found):
     cells = where.gap_map(found.linear, found.gap)
     amplitudes = {row["file"]: row["amplitude_Nm"] for row in _records(found)}
-    return {"summary": where.summary(cells, amplitudes), "map": cells}
+    return {"summary": where.summary(cells, amplitudes, found.shown_left_out), "map": cells}
 
 
 def _which(found: Found, answers, effects, posterior):

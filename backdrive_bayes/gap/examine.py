@@ -124,8 +124,14 @@ class Found:
         closed = self.closed_of(folds) if names and folds else None
         if closed is None or self.closed is None or self.closed["hi"] >= LEAST_CLOSED:
             return False
-        before, floor = (self.held_out.mean_square(part, folds) for part in ("before", "floor"))
-        return before > CLEAR_GAP * floor and closed["hi"] < LEAST_CLOSED
+        return self.held_out.clear_of_noise(folds) > CLEAR_GAP and closed["hi"] < LEAST_CLOSED
+
+    @property
+    def shown_left_out(self) -> str:
+        """The part of the data in which a gap is clearest once it is left out of the fit; none where it is clear in none."""
+        clear = [self.held_out.clear_of_noise(fold) for fold in range(len(self.held_out.names))]
+        best = int(np.argmax(clear))
+        return self.held_out.names[best] if self.named and clear[best] > CLEAR_GAP else ""
 
     @property
     def answers(self) -> dict[str, float]:

@@ -71,6 +71,10 @@ class Shrink:
         own = self._pieces(folds)
         return float(getattr(self, part)[own].sum() / max(self.share[own].sum(), 1e-300))
 
+    def clear_of_noise(self, folds=None) -> float:
+        """Mean square of what the model leaves without the effect, in that of the noise, of one fold, several or all."""
+        return self.mean_square("before", folds) / max(self.mean_square("floor", folds), 1e-300)
+
     def closed(self, part: str, rng, level: float, folds=None) -> dict:
         """Closed fraction of ``after`` or ``control`` with its central interval by a Bayesian bootstrap over folds and pieces, in
         which a right model's error of prediction is drawn too.

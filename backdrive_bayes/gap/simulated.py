@@ -21,6 +21,7 @@ from backdrive_bayes.number_text import per_cent_text
 from backdrive_bayes.records.record import Unit
 
 NO_GAP = "No gap that the data can tell: simulator and unit agree within the noise."
+DOUBTFUL = "Whether there is a gap the data do not tell for sure: more samples, or a larger torque, would."
 UNTOLD = {"median": None, "lo": None, "hi": None}
 """Shares of a gap that cannot be told mean nothing."""
 SHARES = {"closed_by_retuning": "retuning", "closed_by_effect": "effect", "left": "left", "closed_by_both": "both"}
@@ -57,7 +58,7 @@ def compared(found: Diagnosis, simulator: Simulator, seed: int, k: float) -> Dia
     split = Split(found.weighed, simulator, shared, effects_of(next(iter(answers))), seed)
     shares = split.shares(LEVEL)
     apart = split.probability()
-    told = apart >= 0.5 + LEVEL / 2
+    told, likely = apart >= 0.5 + LEVEL / 2, max(float(1.0 - answers["none"]), apart)
     inconclusive = found.json["inconclusive"] or ("" if simulator.posterior.converged else UNCONVERGED)
     maps = _maps(split, found.json["records"], np.random.default_rng([seed, 8]))
     lacks = {
@@ -67,7 +68,7 @@ def compared(found: Diagnosis, simulator: Simulator, seed: int, k: float) -> Dia
     json = found.json | {
         "inconclusive": inconclusive,
         "gap": found.json["gap"] | {
-            "probability": max(float(1.0 - answers["none"]), apart),
+            "probability": likely,
             "rms_rad": split.rms_rad("simulated"), "noise_floor_rad": _floor_rad(split),
         },
         "where": maps.pop("whole"),
@@ -81,7 +82,7 @@ def compared(found: Diagnosis, simulator: Simulator, seed: int, k: float) -> Dia
             "effects": list(simulator.effects),
             "shared_effects": list(shared),
             "told": told,
-            "summary": summary(shares, told, inconclusive, split.lacking),
+            "summary": summary(shares, told, likely, inconclusive, split.lacking),
             "same_path": [same is not None for same in _same(split)],
             "noise_added": {
                 "angle_white_rad": simulator.added.white_rad, "angle_correlated_rad": simulator.added.correlated_rad,
@@ -94,7 +95,7 @@ def compared(found: Diagnosis, simulator: Simulator, seed: int, k: float) -> Dia
                 {"record": name, **{part: split.shares(LEVEL, fold)[part] if told else UNTOLD for part in PARTS}}
                 for fold, name in enumerate(split.held_out["simulated"].names)
             ],
-            "parameters": parameters(simulator.posterior, found.posterior),
+            "parameters": parameters(simulator.posterior, found.posterior, told),
             "convergence": simulator.posterior.convergence.to_json(),
         },
     }  # fmt: skip
@@ -115,12 +116,12 @@ def lacking(measured: Mapping[str, float], simulated: Mapping[str, float]) -> di
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def summary(shares, told: bool, inconclusive: str, effects: tuple[str, ...]) -> str:
-    """The split in one sentence."""
+def summary(shares, told: bool, likely: float, inconclusive: str, effects: tuple[str, ...]) -> str:
+    """The split in one sentence; ``likely`` is the probability of a gap."""
     if inconclusive:
         return "Inconclusive: nothing is named."
     if not told:
-        return NO_GAP
+        return NO_GAP if likely < 0.5 else DOUBTFUL
     first, second, left = (per_cent_text(shares[part]["median"]) for part in PARTS)
     if not effects:
         return f"Re-tuning closes {first} of the gap; no effect is missing, {left} is left."
@@ -129,8 +130,9 @@ def summary(shares, told: bool, inconclusive: str, effects: tuple[str, ...]) -> 
     return f"Re-tuning closes {first} of the gap, {' and '.join(effects).replace('_', ' ')} a further {second}; {left} is left."
 
 
-def parameters(simulated: Posterior, measured: Posterior) -> list[dict]:
-    """The reducer's parameters in the simulator and in the unit, and the change from one to the other, with intervals."""
+def parameters(simulated: Posterior, measured: Posterior, told: bool) -> list[dict]:
+    """The reducer's parameters in the simulator and in the unit, and the change from one to the other, with intervals; where no
+    gap is ``told`` none has changed, whatever stands for what in either fit."""
     rows, old, new = [], posterior_parameters(simulated), posterior_parameters(measured)
     rng = np.random.default_rng([measured.seed, 11])
     for p in (p for p in PARAMETERS if p.name in old and p.name in new):
@@ -139,7 +141,7 @@ def parameters(simulated: Posterior, measured: Posterior) -> list[dict]:
         rows.append({
             "name": p.name, "unit": p.unit, "simulated": float(np.median(old[p.name])),
             "simulated_interval": central(old[p.name], LEVEL), "measured": central(new[p.name], LEVEL),
-            "change": moved, "credible": bool(moved["lo"] * moved["hi"] > 0),
+            "change": moved, "credible": bool(told and moved["lo"] * moved["hi"] > 0),
         })  # fmt: skip
     return rows
 

@@ -100,10 +100,14 @@ def _cell(name, key, own, gap, r, total, amplitude):
     }  # fmt: skip
 
 
-def summary(cells: list[dict], amplitudes: dict[str, float]) -> str:
-    """One plain sentence about a map; ``amplitudes`` are those of the records by name [N·m]."""
+def summary(cells: list[dict], amplitudes: dict[str, float], left_out: str = "") -> str:
+    """One plain sentence about a map; ``amplitudes`` are those of the records by name [N·m], ``left_out`` a part of the data in
+    which the gap stands out once it is left out of the fit."""
     if not any(c["credible"] for c in cells):
-        return "Nowhere does the gap stand out from the noise."
+        text = "Nowhere does the gap stand out from the noise"
+        if left_out:
+            text += f" while the model may bend to all records; it does in {left_out}, as predicted from the others"
+        return text + "."
     share = _shares(cells)
     high = sum(c["share"] for c in cells if max(abs(c["torque_lo_Nm"]), abs(c["torque_hi_Nm"])) > 0.61 * amplitudes[c["record"]])
     low = sum(c["share"] for c in cells if max(abs(c["torque_lo_Nm"]), abs(c["torque_hi_Nm"])) < 0.41 * amplitudes[c["record"]])

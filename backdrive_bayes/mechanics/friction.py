@@ -45,9 +45,15 @@ LARGEST_THRESHOLD = 0.3
 
 @lru_cache(maxsize=1)
 def masing() -> Part:
-    """Friction that is the same at every load, elements in parallel or in series that slip at torques of their own."""
+    """Friction that is the same at every load, elements in parallel or in series that slip at torques of their own.
+
+    Loops of one amplitude have the same width with a threshold r as with that amplitude less r, and elasticity makes up for the
+    rest: what a smaller loop is tells the prior alone, by which friction slips at small torques. It falls in variance, not in
+    standard deviation as where read-outs differ: one body may slip near full load.
+    """
     cells = Cells(THRESHOLDS, -THRESHOLDS, TOP - THRESHOLDS, np.full(THRESHOLDS.size, 2.0))
-    root = _root(THRESHOLDS, _spacing(THRESHOLDS), 1.0)
+    small = np.sqrt(below(THRESHOLDS, LARGEST_THRESHOLD))
+    root = _root(THRESHOLDS, _spacing(THRESHOLDS), np.outer(small, small))
     return Part("masing", "friction", cells, principal_components(cells, root), FRICTION_SCALE)
 
 

@@ -23,7 +23,8 @@ from backdrive_bayes.results import POOL
 def pool_batch(batch: str, units: list[UnitDraws], seed: int = 0, level: float = LEVEL) -> dict:
     """The object of pool.json. BadInput where fewer units than a hierarchy needs can be compared.
 
-    Pooled are units that converged and were not forced, of the rated torque and lost-motion torque that most of them share.
+    Pooled are units that converged and were not forced, of the rated torque and lost-motion torque that most of them share, and
+    no record twice: a copy tells nothing of the batch.
     """
     kept, left = _comparable(units)
     if len(kept) < FEWEST_UNITS:
@@ -48,12 +49,20 @@ def _comparable(units):
     used = [u for u in units if u.usable]
     k = Counter(u.k for u in used).most_common(1)[0][0] if used else None
     rated = most_alike([u.rated_torque_nm for u in used if u.k == k]) if used else None
-    kept, left = [], []
+    kept, left, of_record = [], [], {}
     for unit in units:
-        if unit.usable and unit.k == k and same_amplitude(unit.rated_torque_nm, rated):
-            kept.append(unit)
+        copied = next((of_record[h] for h in unit.data_hashes if h in of_record), None)
+        if not unit.usable:
+            why = "not converged, or forced"
+        elif unit.k != k or not same_amplitude(unit.rated_torque_nm, rated):
+            why = "another rated torque or k"
+        elif copied is not None:
+            why = f"a record of {copied}"
         else:
-            left.append({"unit": unit.name, "why": "another rated torque or k" if unit.usable else "not converged, or forced"})
+            kept.append(unit)
+            of_record |= dict.fromkeys(unit.data_hashes, unit.name)
+            continue
+        left.append({"unit": unit.name, "why": why})
     return kept, left
 
 

@@ -26,6 +26,9 @@ WINDOWS_PER_SEGMENT = 16
 SHORTEST_WINDOW, LONGEST_WINDOW = 16, 2048
 """Samples of a window: from fewer no spectrum can be made, and in more a short ramp's own shape would pass as noise."""
 TREND_DEGREE = 3
+WANDERS_FROM = 1.0 / 8.0
+"""Correlation time in windows above which none is usual: such noise looks like what a window's trend leaves of the loop's shape.
+As windows are a sixteenth of a leg, wanders (:mod:`backdrive_bayes.engine.wander`) begin there."""
 ALIKE = 1.5
 """Ratio of the time between samples of two records below which they tell nothing of whether noise lasts for a time or for
 samples."""
@@ -105,11 +108,13 @@ def estimate_common_noise(records) -> tuple[NoiseEstimate, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Median periodogram ``power`` at angular frequencies ``omega`` [rad/sample], and the weight of its ordinates."""
+    """Median periodogram ``power`` at angular frequencies ``omega`` [rad/sample], the weight of its ordinates, and the samples of
+    a window."""
 
     power: np.ndarray
     omega: np.ndarray
     weight: float
+    window: int
     step_s: float
 
     def model(self, theta) -> np.ndarray:
@@ -166,7 +171,8 @@ def median_periodogram(record: ChannelRecord) -> Spectrum:
     # A Hann taper halves the independent ordinates, the median over windows has the efficiency ln(2)² of their mean.
     weight = len(starts) * 0.5 * np.log(2.0) ** 2
     omega = 2 * np.pi * np.fft.rfftfreq(length)[keep]
-    return Spectrum(np.median(power[:, keep], axis=0) / np.log(2.0), omega, weight, float(np.median(np.diff(record.time_s))))
+    step = float(np.median(np.diff(record.time_s)))
+    return Spectrum(np.median(power[:, keep], axis=0) / np.log(2.0), omega, weight, length, step)
 
 
 def _fit_spectra(spectra):
@@ -186,7 +192,8 @@ def _fit(spectra, log_time, log_time_sd):
     """Least cost of all spectra with the parameters there and their covariance."""
     low = np.median([np.log(s.power[0] + 1e-40) for s in spectra])
     high = np.median([np.log(np.median(s.power[3 * s.power.size // 4 :]) + 1e-40) for s in spectra])
-    centre, spread = np.array([0.5 * low, 0.5 * high, log_time]), np.array([LEVEL_LOG_SD, LEVEL_LOG_SD, log_time_sd])
+    usual = min(log_time, np.log(WANDERS_FROM * max(s.window * s.step_s for s in spectra)))
+    centre, spread = np.array([0.5 * low, 0.5 * high, usual]), np.array([LEVEL_LOG_SD, LEVEL_LOG_SD, log_time_sd])
 
     def cost(theta):
         away = (theta - centre) / spread
@@ -194,13 +201,12 @@ def _fit(spectra, log_time, log_time_sd):
         value = sum(f for f, _ in found) + 0.5 * away @ away + np.log(log_time_sd)
         return value, sum(g for _, g in found) + away / spread
 
-    floor = centre - [12, 12, 0]
-    floor[2] = np.log(min(s.step_s for s in spectra))
+    floor = np.append(centre[:2] - 12, np.log(min(s.step_s for s in spectra)))
     # Of steps longer than any noise lasts there is none that does.
     top = np.maximum(centre + [12, 12, 6], floor)
     bounds = list(zip(floor, top, strict=True))
     shifts = ((0.0, 0.0), (-1.5, -1.0), (-1.0, 1.0))
-    starts = [np.clip(centre + [a, 0, b], floor, np.maximum(centre + 6, floor)) for a, b in shifts]
+    starts = [np.clip(centre + [a, 0, b], floor, top) for a, b in shifts]
     best = min((minimize(cost, x, jac=True, method="L-BFGS-B", bounds=bounds) for x in starts), key=lambda r: r.fun).x
     low, high = np.transpose(bounds)
     for _ in range(POLISHING):

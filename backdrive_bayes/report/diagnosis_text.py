@@ -48,9 +48,12 @@ def verdict(saved: Diagnosed) -> tuple[str, str, str]:
 
 
 def _against_simulator(saved, where):
-    text = Free(_join(answer_words(saved), free(in_words(saved.simulator.get("summary", "")), 300), where, _rivals(saved)))
+    split = free(in_words(saved.simulator.get("summary", "")), 300)
     if not saved.simulator.get("told"):
-        return "good", "NO GAP TO THE SIMULATOR", text
+        likely = saved.result["gap"]["probability"] >= 0.5
+        title = ("caution", "A GAP TO THE SIMULATOR NOT RULED OUT") if likely else ("good", "NO GAP TO THE SIMULATOR")
+        return *title, Free(_join(split, _rivals(saved)))
+    text = Free(_join(answer_words(saved), split, where, _rivals(saved)))
     if not saved.effects:
         return "caution", "GAP TO THE SIMULATOR, CLOSED BY RE-TUNING", text
     if saved.effects == ["unknown"]:
@@ -110,7 +113,7 @@ def _closed(saved):
 def next_test(saved: Diagnosed) -> list:
     """The measurement that would best tell what is still confusable; empty where none is proposed."""
     test = saved.result.get("next_test")
-    if not test or (test.get("expected_entropy_drop_bits") or 1.0) < LEAST_BITS:
+    if not test or test.get("expected_entropy_drop_bits", LEAST_BITS) < LEAST_BITS:
         return []
     separates = ", ".join(label_words(e) for e in test.get("separates") or []) or "not recorded"
     rows: list[tuple[str, str]] = [("Separates", free(separates))]

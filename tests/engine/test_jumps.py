@@ -1,5 +1,6 @@
 """Teeth that leap ahead are told from noise, from waves, from teeth the other way and from single steps."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -198,6 +199,8 @@ def resting(dwell_s, steps=1, seed=3):
         angle = 0.01 * torque - 3e-4 * sense * held / 0.1 + 1e-4 * rng.standard_normal(time.size)
         records.append(Record(f"{rate}.csv", time, torque + 1e-4 * rng.standard_normal(time.size), angle, rate, 1.0))
     reduced = reduce_unit(Unit("resting", 1.0, tuple(records)))
+    # White noise has no duration: which one is estimated, and how many samples are one value, is another matter.
+    reduced = replace(reduced, noise=tuple(replace(n, correlation_time_s=0.03) for n in reduced.noise))
     return SimpleNamespace(reduced=reduced, predicted=[0.01 * b.torque_nm / reduced.angle_scale_rad for b in reduced.blocks])
 
 
@@ -230,6 +233,14 @@ def test_where_arrays_lie_in_memory_changes_nothing():
         kept = [*kept[-20:], np.empty(rng.integers(1, 300))]
         found.add(tooth_gain(series, known, known.memory, 2.2, 4.0))
     assert len(found) == 1
+
+
+def test_a_reading_almost_without_noise_has_a_likelihood():
+    """Values 138 spreads from their noise; where two exponentials were multiplied, one of nothing and one beyond all numbers, a
+    product without a value ended in a division by zero."""
+    value = np.where(np.arange(400) % 90 == 0, 138.0, 0.0) * 0.00703
+    told = tooth_gain(Series(value, np.arange(400) == 0), Noise(0.9998, 0.00703, 1.0, 0.0), 0.9998, 1.23, 4.0)
+    assert np.isfinite(told)
 
 
 def test_teeth_go_on_across_rests_within_a_leg():

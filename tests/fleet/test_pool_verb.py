@@ -6,7 +6,7 @@ import shutil
 import pytest
 from support.decided import write_evidence
 
-from backdrive_bayes.commands.fleet_pool import pool_fleet, show_pools
+from backdrive_bayes.commands.fleet_pool import pool_fleet, retire_pools, show_pools
 from backdrive_bayes.decisions.pool import Pool
 from backdrive_bayes.fleet import cluster
 from backdrive_bayes.fleet.store import posterior_folder
@@ -45,3 +45,5 @@ def test_each_batch_has_its_folder_and_says_what_is_missing(fleet, capsys):
     assert "batch 'spring': POOLED: " in said and "of 6 units" in said
     area = Pool.read(written[0]).predictive("loop_area_J", 0.05, 0.1, 0.003)
     assert area.units == 6 and area.next_unit["lo"] < area.next_unit["median"] < area.next_unit["hi"]
+    retire_pools(job.out)
+    assert not (job.out / "pools").exists()

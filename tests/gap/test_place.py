@@ -216,7 +216,7 @@ def test_legs_within_reach_are_numbered_as_those_that_are_held_out(cycles, names
     ],
 )
 def test_a_name_must_close_a_gap_that_is_seen_without_extrapolating(rates, before, hi, whole, unsupported):
-    held = SimpleNamespace(mean_square=lambda part, folds: {"before": before, "floor": 1.0}[part])
+    held = SimpleNamespace(clear_of_noise=lambda folds: before)
     found = SimpleNamespace(named=("torque_offset",), properties=(), withheld={}, linear=run_at(rates, (1.0, 1.0)), held_out=held)
     found.closed_of, found.closed = lambda folds: {"hi": hi}, {"hi": whole}
     assert examine.Found.unsupported.func(found) is unsupported

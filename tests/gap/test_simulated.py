@@ -11,7 +11,7 @@ from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.gap.diagnose import diagnose
 from backdrive_bayes.gap.simulated import compared, diagnose_simulated, lacking, summary
-from backdrive_bayes.gap.simulator import read_simulator, through_bench
+from backdrive_bayes.gap.simulator import read_simulator, require_reach, through_bench
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.noise import ChannelRecord, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
@@ -145,6 +145,15 @@ def test_torques_beyond_the_simulated_ones_are_refused(reduced):
         diagnose_simulated(reduced.unit, simulated(loops=((0.08, 0.05),)))
 
 
+def test_noise_of_the_torque_reading_reaches_no_further(reduced):
+    """The same paths, the unit's torque read with noise of 2 % (planted fault: the largest sample is compared)."""
+    rng, unit = np.random.default_rng(0), reduced.unit
+    noisy = (replace(r, torque_nm=r.torque_nm + 2e-3 * rng.standard_normal(r.torque_nm.size)) for r in unit.records)
+    noisy = replace(unit, records=tuple(noisy))
+    assert max(np.abs(r.torque_nm).max() for r in noisy.records) > 1.03 * 0.1
+    require_reach(simulated(), noisy)
+
+
 def test_lacking_is_what_the_unit_alone_has():
     found = lacking({"a+b": 0.6, "unknown": 0.3, "none": 0.1}, {"b": 0.5, "unknown": 0.5})
     assert found == pytest.approx({"a": 0.3, "a+b": 0.3, "unknown": 0.3, "none": 0.1})
@@ -153,7 +162,8 @@ def test_lacking_is_what_the_unit_alone_has():
 
 def test_the_sentence_abstains_with_the_result():
     shares = {part: {"median": 0.5} for part in ("retuning", "effect", "left")}
-    assert "creep a further 50 %" in summary(shares, True, "", ("creep",))
-    assert "no effect is missing" in summary(shares, True, "", ())
-    assert "Inconclusive" in summary(shares, True, "not converged", ("creep",))
-    assert "agree within the noise" in summary(shares, False, "", ())
+    assert "creep a further 50 %" in summary(shares, True, 1.0, "", ("creep",))
+    assert "no effect is missing" in summary(shares, True, 1.0, "", ())
+    assert "Inconclusive" in summary(shares, True, 1.0, "not converged", ("creep",))
+    assert "agree within the noise" in summary(shares, False, 0.2, "", ())
+    assert "do not tell for sure" in summary(shares, False, 0.77, "", ())

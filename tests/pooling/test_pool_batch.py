@@ -92,6 +92,15 @@ def test_units_that_cannot_be_compared_are_left_out_with_the_reason(brief):
         pool_batch("spring", brief[:4])
 
 
+def test_a_record_counts_once(brief):
+    """Copies would narrow the batch's mean beyond what one measurement tells (planted fault: a hash of its own)."""
+    copy = replace(brief[0], name="copy")
+    found = pool_batch("spring", [*brief, copy], 3)
+    assert found["left_out"] == [{"unit": "copy", "why": "a record of u0"}]
+    other = replace(copy, data_hashes=("another",))
+    assert "copy" in pool_batch("spring", [*brief, other], 3)["units"]
+
+
 def test_same_units_and_seed_same_object(units, pool):
     again = pool_batch("spring", units, 3)
     assert again == {key: pool[key] for key in again}

@@ -156,6 +156,27 @@ def test_noise_lasts_for_a_time_or_for_samples(in_samples, monkeypatch):
     assert (slow(estimate_common_noise(records)) < 0.5) is in_samples
 
 
+@pytest.mark.parametrize("step_s", [2e-4, 0.02])
+def test_the_clock_does_not_make_noise_of_the_loop_s_shape(step_s, monkeypatch):
+    """A record of .8 s. Where its noise may last for longer than a window (planted fault), what a window's trend leaves of the
+    loop's shape is taken for noise, and the mean of a quarter of a leg is far less certain than it is."""
+    rng = np.random.default_rng(1)
+    torque = np.concatenate([np.linspace(-1.0, 1.0, 2000), np.linspace(1.0, -1.0, 2000)])
+    angle = torque + 0.3 * np.tanh(torque / 0.1) + 1e-3 * rng.standard_normal(4000)
+    time, read = step_s * np.arange(4000), torque + 1e-5 * rng.standard_normal(4000)
+
+    def mean_of_a_quarter():
+        """Its standard deviation in the true one."""
+        found, count = estimate_noise(time, read, angle, find_segments(time, torque)), 500
+        slow = found.correlated_rad**2 * np.exp(-step_s / found.correlation_time_s * np.arange(count))
+        shares = (1.0 - np.arange(count) / count) / count
+        return np.sqrt(2.0 * slow @ shares - slow[0] / count + found.white_rad**2 / count) * np.sqrt(count) / 1e-3
+
+    assert 0.8 < mean_of_a_quarter() < 1.6
+    monkeypatch.setattr(noise, "WANDERS_FROM", np.inf)
+    assert bool(mean_of_a_quarter() > 2.5) is (step_s < 0.001)
+
+
 @pytest.mark.parametrize("step_s", [5.0, 20.0, 300.0])
 def test_records_read_less_often_than_noise_lasts_have_a_noise(step_s):
     """Dead weights put on by hand: no bound of the noise's duration lies below the step from sample to sample."""

@@ -231,12 +231,24 @@ def test_a_simulator_has_a_page_of_its_own(tmp_path):
     assert "friction torque N·m 0.110 0.109 [0.104, 0.114]" in pages[1]
 
 
+def probable(probability):
+    """A gap of that probability."""
+    return {"probability": probability, "unlisted_probability": 0.01, "rms_rad": 1e-5, "noise_floor_rad": 5e-6}
+
+
 @pytest.mark.parametrize(("told", "title"), [(True, "CLOSED BY RE-TUNING"), (False, "NO GAP TO THE SIMULATOR")])
 def test_a_simulator_that_lacks_nothing(tmp_path, told, title):
     answer = {"effects": [], "credible_set_90": ["none"]}
-    write_diagnosis(tmp_path, 1, **simulator(1, told=told), answer=answer)
+    write_diagnosis(tmp_path, 1, **simulator(1, told=told), answer=answer, gap=probable(0.99 if told else 0.2))
     pages = pages_of(tmp_path)
     assert title in pages[0] and ("closed by re-tuning" in pages[1]) == told
+
+
+def test_a_gap_that_is_likely_but_not_told_is_not_called_none(tmp_path):
+    answer = {"effects": [], "credible_set_90": ["none"]}
+    write_diagnosis(tmp_path, 1, **simulator(1, told=False), answer=answer, gap=probable(0.77))
+    page = pages_of(tmp_path)[0]
+    assert "A GAP TO THE SIMULATOR NOT RULED OUT" in page and "NO GAP" not in page
 
 
 def test_the_banner_names_five_rivals_and_counts_the_rest():
