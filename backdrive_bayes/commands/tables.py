@@ -7,6 +7,7 @@ import re
 
 from backdrive_bayes.commands.output import say
 from backdrive_bayes.commands.screen import Column, show_table, width
+from backdrive_bayes.figures.style import words
 from backdrive_bayes.number_text import (
     ARCMIN_PER_RAD,
     interval_text,

@@ -86,7 +86,7 @@ def read_simulator(simulated: Unit, measured: Reduced, seed: int, note: Callable
 
 
 def require_reach(simulated: Unit, unit: Unit) -> None:
-    """BadInput where the unit's torques turn beyond those that the simulator was asked; noise and spikes of the reading do not."""
+    """BadInput where the unit's torques turn beyond those that the simulator was asked, noise of the reading aside."""
     asked, measured = (max(float(np.abs(b.turning_nm).max()) for b in reduce_unit(u).blocks) for u in (simulated, unit))
     if measured > (1.0 + SLACK) * asked:
         reach = f"torques up to {measured:.4g} N·m, the largest of {unit.name}"

@@ -199,8 +199,6 @@ def resting(dwell_s, steps=1, seed=3):
         angle = 0.01 * torque - 3e-4 * sense * held / 0.1 + 1e-4 * rng.standard_normal(time.size)
         records.append(Record(f"{rate}.csv", time, torque + 1e-4 * rng.standard_normal(time.size), angle, rate, 1.0))
     reduced = reduce_unit(Unit("resting", 1.0, tuple(records)))
-    # White noise has no duration: which one is estimated, and how many samples are one value, is another matter.
-    reduced = replace(reduced, noise=tuple(replace(n, correlation_time_s=0.03) for n in reduced.noise))
     return SimpleNamespace(reduced=reduced, predicted=[0.01 * b.torque_nm / reduced.angle_scale_rad for b in reduced.blocks])
 
 
@@ -221,7 +219,13 @@ def test_a_contact_that_is_not_pushed_on_does_not_leap(monkeypatch):
 
 @pytest.mark.parametrize("dwell_s", [0.5, 2.0])
 def test_the_torque_from_sample_to_sample_is_that_of_the_moving_torque(dwell_s):
-    steps = [[teeth.step for teeth in residual_series(resting(d))] for d in (0.0, dwell_s)]
+
+    def of_single_samples(linear):
+        """White noise has no duration: which one is estimated, and how many samples make one value by it, is another matter."""
+        noise = tuple(replace(n, correlation_time_s=1e-3) for n in linear.reduced.noise)
+        return SimpleNamespace(reduced=replace(linear.reduced, noise=noise), predicted=linear.predicted)
+
+    steps = [[teeth.step for teeth in residual_series(of_single_samples(resting(d)))] for d in (0.0, dwell_s)]
     assert steps[1] == pytest.approx(steps[0], rel=0.1)
 
 

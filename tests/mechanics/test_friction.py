@@ -39,7 +39,8 @@ def unit():
         time = np.arange(0, 5 * AMPLITUDE / rate, AMPLITUDE / rate / 400)
         torque = np.interp(time * rate / AMPLITUDE, [0, 1, 3, 5], [0, 1, -1, 1])
         read = AMPLITUDE * (torque + 5e-4 * rng.standard_normal(time.size))
-        records.append(Record(f"{rate}.csv", time, read, angle(torque) + 1.2e-5 * rng.standard_normal(time.size), rate, AMPLITUDE))
+        turned = angle(torque) + 1.2e-5 * rng.standard_normal(time.size)
+        records.append(Record(f"{rate}.csv", time, read, turned, rate, AMPLITUDE))
     return Unit("plays", AMPLITUDE, tuple(records))
 
 
