@@ -507,7 +507,7 @@ def test_a_search_ends_at_derivatives_of_its_own(monkeypatch):
 
 def test_a_lag_that_wanted_to_be_early_on_the_way_is_tried_once_more(monkeypatch):
     """Beside a drag at the shaft. A planted fault: it stays a trace for good."""
-    free = search.Search(reduce_unit(planted(1, lag_s=0.01, drag_nm=2e-3)), library_terms(), BASELINE)
+    free = search.Search(reduce_unit(planted(4, lag_s=0.02, drag_nm=2e-3)), library_terms(), BASELINE)
     like, right, once = free.first(Distortion()), search.Search._backward, set()
     ended = free.find_mode(like, Distortion())
     assert ended.distortion.lag_s > 1e-3
