@@ -153,7 +153,7 @@ def _sound(folder: Path) -> dict[str, bytes]:
 
 
 def _arguments(name: str, data: bytes, folder: Path, posterior: bytes) -> list[str]:
-    """A command that opens the input: no sound posterior hides a history, other texts are read first."""
+    """A command that opens the input; a history is read after the ``posterior``, which must be sound."""
     (folder / name).write_bytes(data)
     out = ["-o", str(folder / "out")]
     if name == "limits.toml":

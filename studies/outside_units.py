@@ -203,7 +203,7 @@ def measure(rng, unit, index, effects):
     q = path.q[path.keep:] + look["torque_noise"] / unit.snr * rng.standard_normal(theta.size)
     return path.t[path.keep:] - path.t[path.keep], unit.rated * q, theta
 
-def write_unit(folder, unit, rng, effects):
+def write_unit(folder, unit, rng, effects, measure):
     folder.mkdir(parents=True, exist_ok=True)
     lines = ['schema = "backdrive-bayes/unit/1"', f'name = "{folder.name}"', f"rated_torque_Nm = {unit.rated!r}"]
     for i, path in enumerate(unit.paths):
@@ -226,7 +226,7 @@ def truth(unit, index, effects):
 @dataclass(frozen=True)
 class Bench:
     """Families and effects (functions of a generator and a unit); ``unlisted`` are (effect, size) as they are dealt, ``outside``
-    names what is no part of the reducer, ``draw_unit`` draws a unit of a family."""
+    names what is no part of the reducer, ``draw_unit`` draws a unit of a family, ``measure`` reads a record of it."""
     seed: int
     families: tuple
     listed: tuple
@@ -234,6 +234,7 @@ class Bench:
     traces: tuple
     outside: set
     draw_unit: Callable
+    measure: Callable = measure
 
     def plan(self, n, rng):
         """[(kind, {effect: size}, family)]: blocks of 80, each shuffled, families dealt in turn within each kind."""
@@ -284,6 +285,6 @@ class Bench:
             name = f"case-{i + 1:02d}"
             rng, unit, found = self.build_unit(args.seed, i, family, sizes, sum(seen[e] for e in sizes) if sizes else i)
             seen.update(list(sizes))
-            write_unit(args.out / name, unit, rng, [(e, s) for e, s, _ in found.values()])
+            write_unit(args.out / name, unit, rng, [(e, s) for e, s, _ in found.values()], self.measure)
             key[name] = self.key_entry(unit, kind, sizes, found)
         (args.out / "key.json").write_text(json.dumps(key, indent=1) + "\n", encoding="utf-8")

@@ -32,7 +32,6 @@ x_debris (chip or fibre in the mesh at one place), x_clock_skew (clocks of torqu
 from dataclasses import dataclass, replace
 
 import numpy as np
-import outside_units
 from numba import njit
 from outside_units import (
     ARCMIN,
@@ -54,6 +53,7 @@ from outside_units import (
     loop_indicators,
     pick,
     settled_path,
+    simulate,
     triangle,
     uniform,
 )
@@ -459,7 +459,7 @@ def draw_records(rng, look):
 def measure(rng, unit, index, effects):
     """Time, torque and angle as the bench records them, SI; correlation over samples, or over seconds of the quickest clock."""
     path, look = unit.paths[index], unit.look
-    theta = outside_units.simulate(unit, path, index, effects)[path.keep:] + unit.zero
+    theta = simulate(unit, path, index, effects)[path.keep:] + unit.zero
     t, share = path.t[path.keep:] - path.t[path.keep], look["correlated"]
     apart = np.r_[0.0, np.diff(t)] * max(look["clock_Hz"]) if look["over"] == "seconds" else np.ones_like(t)
     slow = correlated(rng.standard_normal(t.size), np.exp(-apart / look["length"]))
@@ -470,8 +470,6 @@ def measure(rng, unit, index, effects):
     if look["torque_lsb"] > 0.0:
         q = look["torque_lsb"] / unit.snr * np.round(q * unit.snr / look["torque_lsb"])
     return t, unit.rated * q, theta
-
-outside_units.measure = measure  # this bench's noise in place of the shared one
 
 def draw_unit(rng, family, turn):
     look, reducer = draw_look(rng), make_reducer(family, rng)
@@ -637,7 +635,7 @@ UNLISTED = (x_bedding_in, x_mains_hum, x_lost_counts, x_gain_drift, x_clamp_walk
 TRACES = (torque_offset, sensor_lag, thermal_drift, encoder_error)
 OUTSIDE = {f.__name__ for f in TRACES + UNLISTED} - {"x_debris"}
 
-BENCH = Bench(131, FAMILIES, LISTED, tuple((f, s) for s in SIZES[:2] for f in UNLISTED), TRACES, OUTSIDE, draw_unit)
+BENCH = Bench(131, FAMILIES, LISTED, tuple((f, s) for s in SIZES[:2] for f in UNLISTED), TRACES, OUTSIDE, draw_unit, measure)
 
 if __name__ == "__main__":
     BENCH.main()

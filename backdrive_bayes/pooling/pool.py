@@ -52,17 +52,16 @@ def _comparable(units):
     kept, left, of_record = [], [], {}
     for unit in units:
         copied = next((of_record[h] for h in unit.data_hashes if h in of_record), None)
+        why = f"a record of {copied}" if copied else ""
         if not unit.usable:
             why = "not converged, or forced"
         elif unit.k != k or not same_amplitude(unit.rated_torque_nm, rated):
             why = "another rated torque or k"
-        elif copied is not None:
-            why = f"a record of {copied}"
+        if why:
+            left.append({"unit": unit.name, "why": why})
         else:
             kept.append(unit)
             of_record |= dict.fromkeys(unit.data_hashes, unit.name)
-            continue
-        left.append({"unit": unit.name, "why": why})
     return kept, left
 
 

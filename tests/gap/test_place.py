@@ -66,6 +66,19 @@ def test_a_step_in_one_record_lies_in_that_record():
     assert first in where.summary(cells, {b.name: 0.1 for b in blocks})
 
 
+@pytest.mark.parametrize(
+    ("before", "named", "shown"),
+    [((1.2, 9.0), ("geometric",), "b"), ((9.0, 9.5), (), ""), ((1.0, 3.9), ("geometric",), "")],
+)
+def test_a_gap_to_which_the_fit_bends_shows_in_what_is_left_out(before, named, shown):
+    """The record in which it is clearest; none where nothing is named or none is clear (planted faults)."""
+    held = SimpleNamespace(names=("a", "b"), clear_of_noise=lambda fold: before[fold])
+    assert examine.Found.shown_left_out.fget(SimpleNamespace(held_out=held, named=named)) == shown
+    cells = [{"credible": False}]
+    assert (f"it does in {shown}, as predicted" in where.summary(cells, {}, shown)) is bool(shown)
+    assert "Nowhere" in where.summary(cells, {}, shown)
+
+
 def test_what_is_even_lies_at_high_torque_of_either_sign_in_both_records():
     cells = where.gap_map(*gap_of("asymmetric_stiffness"))
     share = {b: sum(c["share"] for c in cells if c["branch"].endswith(b)) for b in "+-"}
@@ -97,7 +110,7 @@ def test_a_wrong_name_closes_nothing(unit, name):
     assert found["median"] < 0.1 and found["lo"] <= 0.01 and found["hi"] < examine.LEAST_CLOSED
 
 
-def test_a_right_name_keeps_its_interval_above_half_where_other_records_tell_little():
+def test_a_right_name_keeps_its_interval_above_half_shownother_records_tell_little():
     """One settled loop at each of two rates: the prediction from the other record is wide, whatever the name."""
     for seed in range(3):
         unit = planted(seed, known=smooth_reducer(), offset_nm=8e-4)
