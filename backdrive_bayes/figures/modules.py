@@ -21,7 +21,8 @@ CAPTION = (
     "The settled loop as the sum of its modules (median curves) and of the effects, which are the loop minus the sum of the "
     "modules and are left out where they span less than 2 % of it. Panels share the loop's angle scale unless they say otherwise."
 )
-COLUMNS = 4
+COLUMNS = 5
+"""The loop, three modules and the effects beside each other; the modules of other packages go into more rows."""
 VISIBLE = 0.02
 """Effects that span less than this share of the loop's range have no panel."""
 LEGIBLE = 0.1
