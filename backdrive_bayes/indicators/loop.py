@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -98,5 +98,15 @@ def cut_loops(torque, angle) -> Loops:
 
 
 def module_loops(posterior: Posterior, torque, rate_nm_per_s: float) -> dict[str, Loops]:
-    """The loops of each module alone by its name; the whole loop is their sum and what effects add."""
-    return {m: settled_loops(posterior, torque, rate_nm_per_s, (m,)) for m in posterior.reducer.modules}
+    """The loops of each module alone by its name; the whole loop is their sum and what effects add.
+
+    Elements of friction turn with the torque once they slip. What they turn in the mean of both branches is single-valued, so it
+    counts as elasticity here; friction is what its branches differ from that, and encloses the same area.
+    """
+    found = {m: settled_loops(posterior, torque, rate_nm_per_s, (m,)) for m in posterior.reducer.modules}
+    if "friction" in found:
+        turned, friction = found["elastic"], found["friction"]
+        middle = 0.5 * (friction.rising + friction.falling)
+        found["elastic"] = replace(turned, rising=turned.rising + middle, falling=turned.falling + middle)
+        found["friction"] = replace(friction, rising=friction.rising - middle, falling=friction.falling - middle)
+    return found

@@ -59,6 +59,10 @@ def test_modules_add_up_and_split_the_area(posterior):
     np.testing.assert_allclose(area["geometric"] + area["friction"], ind.loop_area_j(full), rtol=1e-9)
     np.testing.assert_allclose(area["elastic"], 0, atol=1e-16)
     assert (area["geometric"] > 0).all() and (area["friction"] > 0).all()
+    alone = settled_loops(posterior, loop_grid(posterior, T), RATE, ("friction",))
+    np.testing.assert_allclose(parts["friction"].width, alone.width, atol=1e-14)
+    np.testing.assert_allclose(parts["friction"].rising, -parts["friction"].falling, atol=1e-14)
+    assert np.abs(alone.rising + alone.falling).max() > 0.1 * alone.rising.max(), "slipping elements turn with the torque"
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3, 1.0])
