@@ -123,18 +123,16 @@ class Posterior:
         return sum((self._grown(part, history, law, growth, mean) for part in range(len(GROWING))), found)
 
     def _grown(self, part: int, history, law, growth, mean):
-        """What growths of one kind of thresholds other than the mode's add, (draws, segments): those that the records told by the
-        derivative, beside which the other weights were drawn; those that have no scale, because nothing tells them, as they are.
-        """
-        found = shift = np.zeros(())
+        """What growths of one kind of thresholds other than the mode's add, (draws, segments): those that are the same all along
+        the history together."""
+        found = steady = np.zeros(())
         for effect in (e for e in self.effects if isinstance(e, GrowthEffect) and e.part == part and e.name in self.flat):
             away, term = self.flat[effect.name][:, 0] - getattr(self.distortion, effect.parameter), law[effect.term]
-            if effect.name not in self.log_scale:
-                shift = shift + away * float(np.mean(term))
-            elif np.any(term):
-                (grown,) = self.reducer.grown(history, mean, growth, part, [term], ends=True)
-                found = found + np.outer(away, grown)
-        return found + self.reducer.shifted(history, mean, growth, part, shift) if np.any(shift) else found
+            if np.ptp(term) > 0.0:
+                found = found + self.reducer.shifted(history, mean, growth, part, away, term)
+            else:
+                steady = steady + away * float(np.mean(term))
+        return found + self.reducer.shifted(history, mean, growth, part, steady) if np.any(steady) else found
 
     def along(self, time_s, torque_nm) -> np.ndarray:
         """Angles [rad] for a torque history, (draws, samples), zero at the first sample's neutral state."""

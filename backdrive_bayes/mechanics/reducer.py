@@ -79,14 +79,16 @@ class ReducerClass:
         here = response(0.0) if here is None else here
         return [(response(term) - here) / step for term in terms]
 
-    def shifted(self, history: History, weights, growth, part: int, shifts) -> np.ndarray:
-        """What growths of friction (0) or of drag (1) by each of ``shifts`` (draws,) more add at the segments' ends, (draws,
-        segments), with independent ``weights``: straight from response to response at quantiles of the shifts, for where a step
-        is crossed no derivative leads far."""
-        own, shifts = [p for p in self.parts if p.name in GROWING[part]], np.clip(shifts, -MOST_GROWTH, MOST_GROWTH)
+    def shifted(self, history: History, weights, growth, part: int, shifts, term=1.0) -> np.ndarray:
+        """What growths of friction (0), of drag (1) or of the drag before all parts (2) by each of ``shifts`` (draws,) times
+        ``term``, one for all or (2, segments), add at the segments' ends, (draws, segments), with independent ``weights``:
+        straight from response to response at quantiles of the shifts, for where a step is crossed no derivative leads far. No
+        drag helps the motion."""
+        own, most = [p for p in self.parts if p.name in GROWING[part]], MOST_GROWTH / max(float(np.abs(term).max()), 1e-300)
+        shifts, least = np.clip(shifts, -most, most), 0.0 if part == len(GROWING) - 1 else -np.inf
 
         def response(shift):
-            grown = tuple(g + shift * (k == part) for k, g in enumerate(growth))
+            grown = tuple(np.maximum(g + shift * term, least) if k == part else g for k, g in enumerate(growth))
             ends = (_response(_cells(p, grown), history, p.weights(weights[p.name]), True) for p in own)
             return sum(ends, np.zeros(history.z1.size))
 

@@ -149,25 +149,28 @@ def test_growth_has_its_own_derivatives(ends, moves):
         assert np.sqrt(np.mean((found - wide) ** 2)) < 0.15 * np.abs(wide).max() and np.abs(wide).max() > 0
 
 
-@pytest.mark.parametrize("part", [0, 1])
-def test_growths_of_draws_are_those_of_the_thresholds(part):
-    """Where a step is crossed the derivative, the planted fault, leads to spikes."""
+@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize(("part", "spread"), [(0, 0.4), (1, 0.4), (2, 0.01)])
+def test_growths_of_draws_are_those_of_the_thresholds(part, spread, moves):
+    """Where a step is crossed the derivative, the planted fault, leads to spikes; no drag helps the motion."""
     history, growth = ramp(0.0, 1.0, -1.0, 1.0), (0.1, -0.1, 0.0)
+    term = np.stack([np.linspace(0.5, 1.5, history.z1.size)] * 2) if moves else 0.8
     rng = np.random.default_rng(1)
     weights = {p.name: rng.standard_normal(p.cells.count if p.mixing is None else p.mixing.shape[1]) for p in REDUCER.parts}
-    shifts = 0.4 * rng.standard_normal(9)
+    shifts = spread * rng.standard_normal(9)
 
     def angle(shift):
-        columns = REDUCER.ends(history, tuple(g + shift * (k == part) for k, g in enumerate(growth)))
+        grown = (g + shift * term * (k == part) for k, g in enumerate(growth))
+        columns = REDUCER.ends(history, tuple(np.maximum(g, 0.0) if k == 2 else g for k, g in enumerate(grown)))
         return sum(columns[n] @ weights[n] for n in columns)
 
     exact = np.stack([angle(shift) for shift in shifts]) - angle(0.0)
-    (grown,) = REDUCER.grown(history, weights, growth, part, [1.0], ends=True)
-    found = REDUCER.shifted(history, weights, growth, part, shifts)
+    (grown,) = REDUCER.grown(history, weights, growth, part, [term], ends=True)
+    found = REDUCER.shifted(history, weights, growth, part, shifts, term)
     assert np.abs(found - exact).max() < 0.3 * np.abs(np.outer(shifts, grown) - exact).max()
-    few = REDUCER.shifted(history, weights, growth, part, shifts[:3])
+    few = REDUCER.shifted(history, weights, growth, part, shifts[:3], term)
     np.testing.assert_allclose(few, exact[:3], atol=1e-9 * np.abs(exact).max())
-    assert not REDUCER.shifted(history, weights, growth, part, np.zeros(2)).any()
+    assert not REDUCER.shifted(history, weights, growth, part, np.zeros(2), term).any()
 
 
 def test_denser_thresholds_leave_the_prior_of_the_loop_as_it_is():
