@@ -16,7 +16,8 @@ from backdrive_bayes.results import PREDICTION, SEAL, read_group
 
 HELP = "angle with 90 % interval for a torque history, from a posterior"
 DRAWS = 400
-NOISY = "the torque history is noisy: it was made monotone between its turning points before it drives the model"
+NOISY = "the torque history is noisy: {:.2g} N·m (rms) of noise was taken out between its turning points"
+FROM_REST = "from rest: no fit reads the first loading, so intervals are too narrow until the torque first turns"
 
 
 def add_arguments(parser) -> None:
@@ -35,7 +36,7 @@ def run(args) -> int:
     import numpy as np
 
     from backdrive_bayes.engine.posterior_read import read_posterior
-    from backdrive_bayes.engine.prediction import nodes, predict_angles, range_caveat, rate_caveat, require_range
+    from backdrive_bayes.engine.prediction import nodes, predict_angles, range_caveat, rate_caveat, require_range, rest_caveat
     from backdrive_bayes.records.history import noise_free_torque, read_history
 
     posterior = read_posterior(args.posterior)
@@ -46,7 +47,7 @@ def run(args) -> int:
     repeat_findings(posterior.unit_name, data)
     time, measured, guessed = read_history(args.path)
     torque, noisy = noise_free_torque(time, measured)
-    for note in (notes := [*guessed, *[NOISY] * noisy]):
+    for note in (notes := [*guessed, *[NOISY.format(float(np.std(measured - torque)))] * noisy]):
         say(f"note: {note}")
     require_range(posterior, torque, args.extrapolate, args.path)
     if not 0 <= args.draws <= DRAWS:
@@ -64,7 +65,8 @@ def run(args) -> int:
         elif (out / "prediction.json").is_file():  # those of the prediction that is replaced
             (out / "draws.csv").unlink(missing_ok=True)
         half = float(np.max(bounds[2] - bounds[1]) / 2)
-        caveats = rate_caveat(posterior, time, torque), range_caveat(posterior, torque)
+        caveats = [caveat(posterior, time, torque) for caveat in (rate_caveat, rest_caveat)]
+        caveats += [range_caveat(posterior, torque), FROM_REST * (args.start == "rest")]
         about = {"reason": f"{time.size} points, half-width at most {half:.3g}′", "notes": notes}
         result = _sidecar(args, posterior, fit[SEAL], data | about | {"caveat": "; ".join(filter(None, caveats))})
         write_json(folder / "prediction.json", result)

@@ -162,8 +162,10 @@ def _cell(interval: dict | None, factor: float = 1.0, provisional: bool = False)
 
 
 def _ratio(found: dict | None) -> str:
-    if not found or not found["ratio"]:
+    if not found:
         return "–"
+    if not found["ratio"]:
+        return f"{_CONTRASTS.get(found['verdict'], found['verdict'])} no ratio"
     median, _, rest = _cell(found["ratio"]).partition("\n" if width() < ONE_LINE else " ")
     return f"{_CONTRASTS.get(found['verdict'], found['verdict'])} {median}{chr(10) if width() < ONE_LINE else ' '}{rest}"
 
@@ -172,7 +174,11 @@ def _limit(row: dict) -> tuple[str, float]:
     """A limit in words, and the factor into the unit in which it is shown."""
     ends = [row[end] if row[end] is not None and math.isfinite(row[end]) else None for end in ("min", "max")]
     unit, factor = _in_prefix(row["unit"], max(abs(end) for end in [*ends, row["median"]] if end is not None))
-    low, high = (None if end is None else f"{end * factor:.4g}" for end in ends)
+    # Two ends are told apart by as many digits as that takes.
+    for digits in range(4, 16):
+        low, high = (None if end is None else f"{end * factor:.{digits}g}" for end in ends)
+        if low != high or ends[0] == ends[1]:
+            break
     bounds = f"{low} to {high}" if low and high else f"≤ {high}" if high else f"≥ {low}"
     return f"{_symbol(row['indicator'])} {bounds} {unit}".rstrip(), factor
 
@@ -186,4 +192,4 @@ def _in_prefix(unit: str, size: float) -> tuple[str, float]:
 
 
 def _symbol(name: str) -> str:
-    return _SYMBOLS.get(name, name.rpartition("_")[0] or name)
+    return _SYMBOLS.get(name) or re.sub("_(rad|Nm|J)$", "", name).replace("_over_", "/")

@@ -75,7 +75,7 @@ def assess(evidences, limits: Limits, probabilities=None, batch=()) -> dict:
         "specific_consumer_risk": together.consumer,
         "specific_producer_risk": together.producer,
         "limiting": {k: rows[limiting][k] for k in ("indicator", "loading_rate_Nm_per_s", "amplitude_Nm")},
-        "next": _next(structure, verdict, rows, limiting, limits),
+        "next": _next(structure, verdict, rows, limiting, limits, together, judged[0].values[0].size),
         "limits": rows,
         "structure": structure.to_json(),
         "convergence": first.about["convergence"],
@@ -255,7 +255,8 @@ def _global(row, first: Evidence, limit: Limit, limits: Limits, batch) -> dict |
     return {"process": told, "batch_units": units, "uncertainty": row["sd"], "accepted": accepted} | found
 
 
-def _next(structure: Structure, verdict: Verdict, rows: list[dict], limiting: int, limits: Limits) -> dict | None:
+def _next(structure, verdict, rows: list[dict], limiting: int, limits: Limits, together: Risks, draws: int) -> dict | None:
+    """What to do after an inconclusive verdict, which rests on so many draws."""
     if verdict is not Verdict.INCONCLUSIVE:
         return None
     row, repeats = rows[limiting], None
@@ -264,6 +265,8 @@ def _next(structure: Structure, verdict: Verdict, rows: list[dict], limiting: in
     elif structure.unknown > min(limits.consumer, limits.producer):
         test = (structure.models[0].evidence.diagnosis or {}).get("next_test") or {}
         text = f"Explain the gap first. {test.get('do') or _EXPLAIN}"
+    elif min(together.consumer, together.producer) <= (least := share(np.zeros(draws, bool))) * (1 + 1e-9):
+        text = f"Agree on larger risks: {draws} draws tell none below {100 * least:.2g} %; none of them says otherwise."
     else:
         repeats = None if row["predicted"] else repeats_to_settle(rows, limits.consumer, limits.producer)
         text = advice(row, repeats)

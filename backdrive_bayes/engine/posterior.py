@@ -11,7 +11,7 @@ from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.engine.diagnostics import Convergence
 from backdrive_bayes.mechanics.effect import Context, Distortion, Effect, GrowthEffect
 from backdrive_bayes.mechanics.history import History, through
-from backdrive_bayes.mechanics.reducer import GROWING, ReducerClass
+from backdrive_bayes.mechanics.reducer import GROWING, GROWING_MODULES, ReducerClass
 from backdrive_bayes.records.reduction import loading_rate
 
 
@@ -105,22 +105,24 @@ class Posterior:
         for name, columns in base.items():
             if modules is None or self.reducer.part(name).module in modules:
                 found = found + self.flat[name] @ columns.T
+        law = self.distortion.law(log_rate, history.log_amplitude, self.context)
+        mean = {n: self.flat[n].mean(axis=0) for n in base}
         if modules is None:
-            found = found + self._effects(history, log_rate, growth, base)
-        return found * self.context.angle_scale_rad
+            found = found + self._effects(history, growth, base, mean)
+        # A drag before all parts is of no module.
+        parts = range(len(GROWING)) if modules is None else [i for i, m in enumerate(GROWING_MODULES) if m in modules]
+        return sum((self._grown(part, history, law, growth, mean) for part in parts), found) * self.context.angle_scale_rad
 
-    def _effects(self, history, log_rate, growth, base):
+    def _effects(self, history, growth, base, mean):
         """What effects of the reducer itself add, (draws, segments) in shares of the angle scale."""
-        found, mean = 0.0, {n: self.flat[n].mean(axis=0) for n in base}
-        turned = sum(base[n] @ mean[n] for n in base)
+        found, turned = 0.0, sum(base[n] @ mean[n] for n in base)
         for effect in self.effects:
             if effect.name not in self.flat or not effect.of_reducer:
                 continue
             columns = effect_columns(effect, self.reducer, history, mean, growth, turned, self.context, ends=True)
             if columns is not None:
                 found = found + self.flat[effect.name] @ columns.T
-        law = self.distortion.law(log_rate, history.log_amplitude, self.context)
-        return sum((self._grown(part, history, law, growth, mean) for part in range(len(GROWING))), found)
+        return found
 
     def _grown(self, part: int, history, law, growth, mean):
         """What growths of one kind of thresholds other than the mode's add, (draws, segments): those that are the same all along

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.part import TOP
 from backdrive_bayes.number_text import plain
 from backdrive_bayes.records.reduction import loading_rate
+from backdrive_bayes.records.turning import SHARE, zigzag
 
 MOST_NODES = 20_000
 """Samples at which the class is evaluated; between them, on one monotone run, curves are straight."""
@@ -79,20 +81,32 @@ def range_caveat(posterior: Posterior, torque_nm) -> str:
 
 
 def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:
-    """What is to be kept in mind of a history's loading rate, beside those measured; empty where it is among them.
+    """What is to be kept in mind of the loading rate of a history's legs, beside those measured; empty where all are among them.
 
     From one rate alone nothing is learnt of how friction grows with it.
     """
-    rate = loading_rate(time_s, torque_nm)
-    if not rate:
-        return ""
+    time, torque = np.asarray(time_s, float), np.asarray(torque_nm, float)
+    turns = [0, *zigzag(torque.tolist(), SHARE * float(np.ptp(torque))), torque.size - 1] if np.ptp(torque) else []
+    legs = (slice(start, stop + 1) for start, stop in itertools.pairwise(turns))
+    rates = [rate for leg in legs if (rate := loading_rate(time[leg], torque[leg]))]
     low, high = (float(end(posterior.records.rate_nm_per_s)) for end in (np.min, np.max))
+    rate = max(rates, key=lambda r: max(low / r, r / high), default=low)
     lone = high < LONE_RATE_REACH * low
     reach = LONE_RATE_REACH if lone else RATE_REACH
     if low / reach <= rate <= reach * high:
         return ""
     measured = f"the only one measured, {plain(high)} N·m/s" if lone else f"those measured, {plain(low)} to {plain(high)} N·m/s"
     return f"the loading rate of {plain(rate)} N·m/s is far from {measured}: what it does to the angle is extrapolated"
+
+
+def rest_caveat(posterior: Posterior, time_s, torque_nm) -> str:
+    """What is to be kept in mind of rests that last longer than every record; empty where there are none."""
+    edges = np.flatnonzero(np.diff(np.diff(torque_nm) == 0.0, prepend=False, append=False))
+    longest = float(np.max(np.diff(np.asarray(time_s, float)[edges])[::2], initial=0.0))
+    known = max(float(b.end_s[-1] - b.begin_s[0]) for b in posterior.records.blocks)
+    if longest <= known:
+        return ""
+    return f"a rest of {plain(longest)} s is longer than all records ({plain(known)} s): what creeps meanwhile is extrapolated"
 
 
 def _from(posterior, time, torque, rate, preload_nm):

@@ -19,7 +19,8 @@ from backdrive_bayes.number_text import ARCMIN_PER_RAD, plain
 
 CAPTION = (
     "The settled loop as the sum of its modules (median curves) and of the effects, which are the loop minus the sum of the "
-    "modules and are left out where they span less than 2 % of it. Panels share the loop's angle scale unless they say otherwise."
+    "modules and are left out where they span less than 2 % of it. What slipping elements turn in the mean of both branches is "
+    "elastic. Panels share the loop's angle scale unless they say otherwise."
 )
 COLUMNS = 5
 """The loop, three modules and the effects beside each other; the modules of other packages go into more rows."""

@@ -25,6 +25,8 @@ ELASTIC_NODES = (0.0, 0.015, 0.04, 0.08, 0.15, 0.25, 0.4, 0.55, 0.7, 0.85, 0.95,
 EVERY = ("compliance", "elastic", *FRICTION, "clearance", "free_play")
 GROWING = (FRICTION, ("clearance",), EVERY)
 """Parts whose thresholds follow the rate and the amplitude: of friction, and drags; and those behind a drag at the shaft."""
+GROWING_MODULES = ("friction", "geometric")
+"""Modules of the first two of them."""
 SHIFTS = 7
 """Growths of the draws at which responses are made, those between are interpolated: their quantiles, from least to largest, the
 inner ones half a standard deviation apart."""

@@ -55,6 +55,15 @@ def test_several_limits_are_kept_together_or_not():
     assert result["next"]["repeats_in_all"] == 2 and "Repeat the records 1 time more" in result["next"]["do"]
 
 
+@pytest.mark.parametrize("sds", [60, -60])
+def test_a_risk_below_what_draws_tell_is_no_matter_of_repeats(sds):
+    """A verdict would rest on no draw at all: neither accepted nor rejected, and repeating the records would not help."""
+    result = assess([evidence()], Limits((area(sds),), 1e-5, 1e-5))
+    assert result["verdict"] == "inconclusive" and result["next"]["repeats_in_all"] is None
+    assert "Agree on larger risks" in result["next"]["do"] and "draws tell none below" in result["next"]["do"]
+    assert "Agree" not in assess([evidence()], Limits((area(1.0),), 1e-5, 1e-5))["next"]["do"]
+
+
 def test_the_limiting_indicator_is_the_least_sure_one():
     result = judge(area(1.4), Limit("peak_angle_rad", hi=1.0, where="w"))
     assert result["limiting"]["indicator"] == "loop_area_J"

@@ -45,6 +45,8 @@ def test_two_sided_acceptance_is_where_the_conformance_is_reached():
     low, high = acceptance_interval(0.5, 0.0, 4.0, 0.95)
     assert normal_conformance(high, 0.5, 0.0, 4.0) == pytest.approx(0.95, abs=1e-9) and low == pytest.approx(4 - high)
     assert acceptance_interval(3.0, 0.0, 4.0, 0.95) is None, "an uncertainty as wide as the limits accepts nothing"
+    low, high = acceptance_interval(0.5, 0.0, 4.0, 1e-30)
+    assert 4.0 + 11 * 0.5 < high < 4.0 + 13 * 0.5, "however small a probability is asked for"
 
 
 draws = st.lists(st.floats(-10, 10), min_size=1, max_size=60).map(np.array)

@@ -7,7 +7,7 @@ import pytest
 from support.made_posterior import OFFSET, known, made_posterior
 
 from backdrive_bayes.engine import prediction
-from backdrive_bayes.engine.prediction import nodes, predict_angles, rate_caveat, require_range
+from backdrive_bayes.engine.prediction import nodes, predict_angles, rate_caveat, require_range, rest_caveat
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.registry import LIBRARY
@@ -115,6 +115,20 @@ def test_loading_rates_far_from_those_measured_are_told():
     assert told(lone, 0.06) == ""
     assert "far from the only one measured, 0.051 N·m/s" in told(lone, 0.1)
     assert rate_caveat(many, np.arange(401), np.zeros(401)) == ""
+    # One fast leg among slow ones does not drown in their mean.
+    time, turning = np.r_[0.0, 2.0, 6.0, 6.1, 8.1], np.array([0.0, 0.1, -0.1, 0.1, 0.0])
+    assert "loading rate of 2 N·m/s is far from" in rate_caveat(many, time, turning)
+
+
+def test_rests_longer_than_all_records_are_told():
+    posterior = made_posterior()
+    known = max(b.end_s[-1] - b.begin_s[0] for b in posterior.records.blocks)
+    torque = np.array([0.0, 0.1, 0.1, 0.1, 0.0])
+    for rest, told in ((0.9 * known, ""), (1.1 * known, "s is longer than all records")):
+        time = np.cumsum([0.0, 3.0 * known, 0.5 * rest, 0.5 * rest, 1.0])
+        assert told in (found := rest_caveat(posterior, time, torque)) and bool(told) == bool(found)
+    assert rest_caveat(posterior, [0.0, 1.0], [0.0, 0.1]) == ""
+    assert rest_caveat(posterior, [0.0, 2.0 * known], [0.1, 0.1]) != ""
 
 
 def test_long_histories_are_evaluated_at_nodes_that_hold_the_turning_points(monkeypatch):
