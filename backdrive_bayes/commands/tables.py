@@ -174,7 +174,7 @@ def _limit(row: dict) -> tuple[str, float]:
     """A limit in words, and the factor into the unit in which it is shown."""
     ends = [row[end] if row[end] is not None and math.isfinite(row[end]) else None for end in ("min", "max")]
     unit, factor = _in_prefix(row["unit"], max(abs(end) for end in [*ends, row["median"]] if end is not None))
-    # Two ends are told apart by as many digits as that takes.
+    # As many digits as it takes to see that the limits differ.
     for digits in range(4, 16):
         low, high = (None if end is None else f"{end * factor:.{digits}g}" for end in ends)
         if low != high or ends[0] == ends[1]:

@@ -88,14 +88,11 @@ def normal_conformance(estimate, uncertainty, lo=-np.inf, hi=np.inf):
     return ndtr((hi - estimate) / uncertainty) - ndtr((lo - estimate) / uncertainty)
 
 
-NEVER = 40.0
-"""Standard deviations beyond a limit from which on no double tells a normal probability from none."""
-
-
 def acceptance_interval(uncertainty: float, lo: float, hi: float, conformance: float) -> tuple[float, float] | None:
     """Estimates whose normal p_c is at least ``conformance``; None where no estimate reaches it. JCGM 106:2012, 8.3."""
     if np.isfinite(lo) and np.isfinite(hi):
-        centre, reach = 0.5 * (lo + hi), 0.5 * (hi - lo) + NEVER * uncertainty
+        # One limit alone would allow an estimate as near to it as that, a standard uncertainty less.
+        centre, reach = 0.5 * (lo + hi), 0.5 * (hi - lo) + (1.0 - ndtri(conformance)) * uncertainty
         if normal_conformance(centre, uncertainty, lo, hi) < conformance:
             return None
         half = brentq(lambda d: normal_conformance(centre + d, uncertainty, lo, hi) - conformance, 0.0, reach)

@@ -10,16 +10,13 @@ from scipy.optimize import isotonic_regression
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.clock import strictly_rising
 from backdrive_bayes.records.columns import read_channels
-from backdrive_bayes.records.turning import zigzag
+from backdrive_bayes.records.turning import NOISE_MULTIPLE, zigzag
 from backdrive_bayes.records.white_noise import white_noise
 
 FEWEST_STAMPS = 100
 """Samples from which on a time stamp that comes twice is that of a coarse clock and no step."""
 FEW_REVERSALS = 20
 """Reversals up to which a history is none that noise made."""
-SWING = 8.0
-"""Torque, in standard deviations of its noise, by which a history turns where it truly turns: noise of many thousand samples
-reaches four to either side."""
 BINS_PER_LEG = 100
 """Means of a leg at most, of which the monotone torque is made."""
 MOST_LEFT = 1.5
@@ -49,10 +46,10 @@ def noise_free_torque(time_s, torque_nm) -> tuple[np.ndarray, bool]:
     """
     steps, noise = np.diff(torque_nm), white_noise(torque_nm, time_s)
     reversals = np.count_nonzero(np.diff(np.sign(steps[steps != 0])))
-    if reversals <= FEW_REVERSALS or SWING * noise > 0.5 * np.ptp(torque_nm):
+    if reversals <= FEW_REVERSALS or NOISE_MULTIPLE * noise > 0.5 * np.ptp(torque_nm):
         return torque_nm, False
     smooth = np.empty_like(torque_nm)
-    turns = [0, *zigzag(torque_nm.tolist(), SWING * noise), torque_nm.size - 1]
+    turns = [0, *zigzag(torque_nm.tolist(), NOISE_MULTIPLE * noise), torque_nm.size - 1]
     for start, stop in zip(turns[:-1], turns[1:], strict=True):
         part = torque_nm[start : stop + 1]
         edges = np.unique(np.linspace(0, part.size, min(BINS_PER_LEG, part.size) + 1).astype(int))

@@ -9,7 +9,7 @@ from backdrive_bayes.records.white_noise import white_noise
 
 SHARE = 0.05  # a reversal smaller than this share of the peak-to-peak torque is ripple
 _MAIN_SHARE = 0.35  # reversals of this share set the length of a typical segment
-_NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the smoothed noise is noise
+NOISE_MULTIPLE = 8.0  # a reversal smaller than so many standard deviations of the noise is noise: it reaches four to either side
 _BLOCKS_PER_SEGMENT = 64
 LINE_POINTS = 2000  # block means lose nothing of a straight line
 _TOP_SHARE = 0.003  # a turning point lies no further below the top, in shares of the range
@@ -31,7 +31,7 @@ def coarse_turning_points(torque_nm: np.ndarray) -> list[int]:
         return []
     block = max(1, _segment_length(smooth, span) // _BLOCKS_PER_SEGMENT)
     blocks = median_filter(block_means(torque_nm, block), _MEDIAN_BLOCKS if block > 1 else 5, mode="nearest")
-    threshold = max(SHARE * float(np.ptp(blocks)), _NOISE_MULTIPLE * noise / np.sqrt(block))
+    threshold = max(SHARE * float(np.ptp(blocks)), NOISE_MULTIPLE * noise / np.sqrt(block))
     return [k * block + block // 2 for k in zigzag(blocks.tolist(), threshold)]
 
 
