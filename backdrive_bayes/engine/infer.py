@@ -15,8 +15,8 @@ from backdrive_bayes.engine.posterior import Posterior, RecordFacts
 from backdrive_bayes.engine.reduced import Reduced, reduce_unit
 from backdrive_bayes.engine.sample import sample
 from backdrive_bayes.errors import BadInput
-from backdrive_bayes.mechanics.reducer import BASELINE
-from backdrive_bayes.mechanics.registry import AMPLITUDE_EXPONENTS, library_terms
+from backdrive_bayes.mechanics.reducer import BASELINE, GROWING
+from backdrive_bayes.mechanics.registry import UNSEEN, library_terms
 from backdrive_bayes.records.faults import without_wild
 from backdrive_bayes.records.record import Unit
 
@@ -80,12 +80,13 @@ def infer(
 
 
 def _unlearnt(linear: Linear, shape: tuple[int, int], seed: int) -> dict[str, np.ndarray]:
-    """Draws from their priors, (chains, draws, 1) each, of what every reducer has and the records do not tell: loops of one
-    amplitude know nothing of how thresholds follow it, and at another amplitude it counts. That the exponent changes in turn is
-    not supposed of what was not seen."""
+    """Draws from their priors, (chains, draws, 1) each, of what any reducer may have and the records do not tell: loops of one
+    amplitude or of one rate know nothing of how thresholds follow it, and at another one it counts. That the exponent changes in
+    turn is not supposed of what was not seen."""
     rng, context = np.random.default_rng([seed, 5]), linear.reduced.context
-    own = (e for e in AMPLITUDE_EXPONENTS if e in linear.effects and e.name not in linear.design.names)
-    return {e.name: e.present(context) * rng.standard_normal((*shape, 1)) for e in own}
+    there = {p.name for p in linear.reducer.parts}
+    own = (e for e in UNSEEN if e.name not in linear.design.names and there.intersection(GROWING[e.part]))
+    return {e.name: e.present(context) * rng.standard_normal((*shape, 1)) for e in own if e in linear.effects}
 
 
 def record_facts(reduced: Reduced) -> RecordFacts:

@@ -83,7 +83,7 @@ def range_caveat(posterior: Posterior, torque_nm) -> str:
 def rate_caveat(posterior: Posterior, time_s, torque_nm) -> str:
     """What is to be kept in mind of the loading rate of a history's legs, beside those measured; empty where all are among them.
 
-    From one rate alone nothing is learnt of how friction grows with it.
+    From one rate alone nothing is learnt of how friction grows with it, and bands are as wide as a usual law makes them.
     """
     time, torque = np.asarray(time_s, float), np.asarray(torque_nm, float)
     turns = [0, *zigzag(torque.tolist(), SHARE * float(np.ptp(torque))), torque.size - 1] if np.ptp(torque) else []

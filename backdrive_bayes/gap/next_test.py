@@ -77,8 +77,8 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
             angle = angle + columns @ weight[: columns.shape[1]]
         elif isinstance(effect, GrowthEffect):
             term = linear.distortion.law(log_rate, history.log_amplitude, context)[effect.term]
-            (by,) = linear.reducer.grown(history, mean, growth, effect.part, [term], ends=True)
-            angle = angle + (float(weight[0]) - getattr(linear.distortion, effect.parameter)) * by
+            away = weight[:1] - getattr(linear.distortion, effect.parameter)
+            angle = angle + linear.reducer.shifted(history, mean, growth, effect.part, away, term)[0]
         elif isinstance(effect, TangentEffect):
             # The path itself is free of offset and lag: their whole size counts.
             angle = angle + float(weight[0]) * {"offset": direction * slope, "lag_s": -rate * slope}[effect.parameter]

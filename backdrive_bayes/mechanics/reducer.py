@@ -67,15 +67,15 @@ class ReducerClass:
         """
         return {p.name: p.mix(_cells(p, growth).means(history)) for p in self.parts}
 
-    def grown(self, history: History, weights, growth, part: int, terms, ends: bool = False, here=None) -> list[np.ndarray]:
-        """Derivatives of the block means (blocks,) with independent ``weights``, or at the segments' ends, by the growth of
-        friction (0) or of drag (1), or by the drag before all parts (2), in the direction of each of ``terms``, one for all or
-        (2, segments). What the parts that grow make as they are may be known, ``here``."""
+    def grown(self, history: History, weights, growth, part: int, terms, here=None) -> list[np.ndarray]:
+        """Derivatives of the block means (blocks,) with independent ``weights`` by the growth of friction (0) or of drag (1), or
+        by the drag before all parts (2), in the direction of each of ``terms``, one for all or (2, segments). What the parts that
+        grow make as they are may be known, ``here``."""
         own, step = [p for p in self.parts if p.name in GROWING[part]], GROWTH_STEPS[part]
 
         def response(term):
             grown = tuple(g + step * term if k == part else g for k, g in enumerate(growth))
-            moved = (_response(_cells(p, grown), history, p.weights(weights[p.name]), ends) for p in own)
+            moved = (_cells(p, grown).summed(history, p.weights(weights[p.name])) for p in own)
             return sum(moved, np.zeros(()))
 
         here = response(0.0) if here is None else here
@@ -91,7 +91,7 @@ class ReducerClass:
 
         def response(shift):
             grown = tuple(np.maximum(g + shift * term, least) if k == part else g for k, g in enumerate(growth))
-            ends = (_response(_cells(p, grown), history, p.weights(weights[p.name]), True) for p in own)
+            ends = (_cells(p, grown).ends(history) @ p.weights(weights[p.name]) for p in own)
             return sum(ends, np.zeros(history.z1.size))
 
         nodes = np.unique(np.r_[0.0, np.quantile(shifts, np.linspace(0.0, 1.0, SHIFTS))])
@@ -106,12 +106,13 @@ class ReducerClass:
         """Means on the segments and values at their ends, two of (segments,), at independent ``weights`` by part."""
         count = history.z0.size
         each = replace(history, block=np.arange(count), weight=np.ones(count), blocks=count)
-        ends = (_response(_cells(p, growth), history, p.weights(weights[p.name]), True) for p in self.parts)
+        ends = (_cells(p, growth).ends(history) @ p.weights(weights[p.name]) for p in self.parts)
         return self.predict(each, weights, growth), sum(ends, np.zeros(()))
 
     def flank_columns(self, history: History, weights, growth=UNGROWN, ends: bool = False):
         """Even counterparts of the parts at ``weights`` (independent ones by part), (blocks, parts), or at the segments' ends."""
-        columns = (_response(_cells(p, growth), history, p.weights(weights[p.name]), ends, sign=-1.0) for p in self.parts)
+        parts = ((_cells(p, growth), p.weights(weights[p.name])) for p in self.parts)
+        columns = (c.ends(history, sign=-1.0) @ w if ends else c.summed(history, w, sign=-1.0) for c, w in parts)
         return np.stack(list(columns), axis=1)
 
     def predict(self, history: History, weights, growth=UNGROWN) -> np.ndarray:
@@ -124,11 +125,6 @@ def _cells(part, growth) -> Cells:
     friction, drag, before = growth
     own = friction if part.name in GROWING[0] else drag if part.name in GROWING[1] else 0.0
     return part.cells.grown(own, before)
-
-
-def _response(cells, history, weights, ends, sign=1.0):
-    """Sum of the cells' responses times ``weights`` (cells,), block means or at the segments' ends."""
-    return cells.ends(history, sign=sign) @ weights if ends else cells.summed(history, weights, sign=sign)
 
 
 def _compliance() -> Part:

@@ -52,8 +52,8 @@ UNEQUAL = (UNEQUAL_FLANKS,)
 searched it may be more, or the class is bent by what breaks its symmetry."""
 NONCONGRUENT = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE, FRICTION_AMPLITUDE_BEND, DRAG_AMPLITUDE_BEND)
 """What every reducer has at trace level beside the operator: loops of other amplitudes are not quite congruent."""
-AMPLITUDE_EXPONENTS = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE)
-"""Those of them that are supposed of amplitudes that were not seen."""
+UNSEEN = (FRICTION_AMPLITUDE, DRAG_AMPLITUDE, FRICTION_RATE, DRAG_RATE)
+"""What is supposed of amplitudes and of rates that were not seen: any reducer's thresholds may follow them."""
 OPERATOR_PROPERTIES = ("second_backlash", "interface_slip")
 """Effects that lie inside the class: any fit holds them."""
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 from scipy.stats import t as student
-from support.planted import joint_mode, planted, prepared
+from support.planted import LOOPS, joint_mode, planted, prepared
 
 from backdrive_bayes.bench.known_truth import BenchNoise, random_reducer, simulate_unit
 from backdrive_bayes.engine import infer as module
@@ -16,8 +16,7 @@ from backdrive_bayes.engine.infer import infer
 from backdrive_bayes.engine.reduced import reduce_unit
 from backdrive_bayes.indicators.draws import IndicatorDraws, core_indicators
 from backdrive_bayes.indicators.loop import cut_loops, settled_history
-from backdrive_bayes.mechanics.effects import noncongruent_loops
-from backdrive_bayes.mechanics.registry import AMPLITUDE_EXPONENTS, library_terms
+from backdrive_bayes.mechanics.registry import UNSEEN, library_terms
 from backdrive_bayes.records.record import Unit
 
 UNITS, LEVEL, AMPLITUDE, RATE, K = 40, 0.9, 0.1, 0.1, 0.03
@@ -124,22 +123,26 @@ def test_a_coarsened_posterior_is_wider():
     assert all(np.diff(third[n])[0] > 1.3 * np.diff(full[n])[0] for n in NAMES)
 
 
-def test_loops_of_one_amplitude_tell_nothing_of_how_thresholds_follow_it():
-    """Every reducer has that law: a smaller loop is as uncertain as the law is a priori, one of the same size is not. The planted
-    fault takes the mean of the law for all there is."""
-    linear = joint_mode(reduce_unit(planted(), 30), library_terms())
-    posterior, names = fitted_by(linear, ()), {e.name for e in AMPLITUDE_EXPONENTS}
-    assert names and not names.intersection(linear.design.names) and names <= set(posterior.weights)
-    for name in names:
-        assert np.std(posterior.weights[name]) == pytest.approx(noncongruent_loops.USUAL, rel=0.1)
-    without = replace(posterior, weights={n: w for n, w in posterior.weights.items() if n not in names})
+@pytest.mark.parametrize(("loops", "term"), [(LOOPS, 1), (((0.05, 0.1), (0.1, 0.1)), 0)], ids=["amplitude", "rate"])
+def test_loops_of_one_size_tell_nothing_of_how_thresholds_follow_it(loops, term):
+    """Any reducer may have that law: a smaller loop, or one of another rate, is as uncertain as the law is a priori, one of the
+    same size and rate is not. The planted fault takes the mean of the law for all there is."""
+    linear = joint_mode(reduce_unit(planted(loops=loops), 30), library_terms())
+    posterior, laws = fitted_by(linear, ()), {e.name: e for e in UNSEEN if e.term == term}
+    assert len(laws) == 2 and not set(laws).intersection(linear.design.names) and set(laws) <= set(posterior.weights)
+    assert {e.name for e in UNSEEN if e.term != term} <= set(linear.design.names)
+    for name, law in laws.items():
+        assert np.std(posterior.weights[name]) == pytest.approx(law.present(posterior.context), rel=0.1)
+    without = replace(posterior, weights={n: w for n, w in posterior.weights.items() if n not in laws})
 
-    def spread(which, amplitude):
+    def spread(which, amplitude, rate):
         torque = np.linspace(-amplitude, amplitude, 101)
-        return np.std(cut_loops(torque, which.angles(settled_history(torque, RATE, AMPLITUDE), RATE)).width.mean(axis=1))
+        return np.std(cut_loops(torque, which.angles(settled_history(torque, rate, AMPLITUDE), rate)).width.mean(axis=1))
 
-    assert spread(posterior, 0.1 * AMPLITUDE) > 2.0 * spread(without, 0.2 * AMPLITUDE)
-    assert spread(posterior, AMPLITUDE) == pytest.approx(spread(without, AMPLITUDE), rel=0.01)
+    away = (0.1 * AMPLITUDE, RATE) if term == 1 else (AMPLITUDE, 20.0 * RATE)
+    assert spread(posterior, *away) > 2.0 * spread(without, *away)
+    near = (float(posterior.records.amplitude_nm.max()), float(posterior.records.rate_nm_per_s[0]))
+    assert spread(posterior, *near) == pytest.approx(spread(without, *near), rel=0.01)
 
 
 def test_one_seed_gives_the_same_bytes():

@@ -10,7 +10,7 @@ from backdrive_bayes.indicators import indicators as ind
 from backdrive_bayes.indicators import loop
 from backdrive_bayes.indicators.draws import core_indicators
 from backdrive_bayes.indicators.loop import loop_grid, module_loops, settled_loops, torque_grid
-from backdrive_bayes.mechanics.registry import AMPLITUDE_EXPONENTS, LIBRARY
+from backdrive_bayes.mechanics.registry import LIBRARY, UNSEEN
 
 T, RATE = 0.1, 0.05
 
@@ -102,8 +102,8 @@ def test_modules_have_the_growths_of_the_draws_as_the_whole_loop_has():
     """At other amplitudes thresholds follow these; with those of the mode alone, the planted fault, the areas are too certain."""
     posterior = made_posterior(loops=((RATE, T), (RATE, 0.5 * T)))
     exponent = 0.3 * np.linspace(-1, 1, posterior.log_density.size).reshape(*posterior.shape, 1)
-    drawn = {e.name: exponent for e in AMPLITUDE_EXPONENTS}
-    growing = replace(posterior, weights=posterior.weights | drawn, effects=(*posterior.effects, *AMPLITUDE_EXPONENTS))
+    drawn = {e.name: exponent for e in UNSEEN}
+    growing = replace(posterior, weights=posterior.weights | drawn, effects=(*posterior.effects, *UNSEEN))
     grid = loop_grid(posterior, 0.2 * T)
     full, parts = settled_loops(growing, grid, RATE), module_loops(growing, grid, RATE)
     np.testing.assert_allclose(sum(p.rising for p in parts.values()), full.rising, atol=1e-9 * np.abs(full.rising).max())
