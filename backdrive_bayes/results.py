@@ -119,13 +119,21 @@ def require_same_data(path: Path, result: dict, about: dict, version: bool = Tru
     """BadInput unless the result at ``path`` is of the unit, the data and (unless it rests on the fit) the version of an
     indicators object, and of its ``k``; a verdict also of its posterior, where it says on which it rests.
     """
-    _require_equal(path, result, about, ("unit", "data_sha256", "unit_sha256", *(("version",) if version else ())))
-    for key, found, own in (
-        ("k", result["options"].get("k"), about["options"].get("k")),
-        ("posterior_sha256", result.get("posterior_sha256"), about.get("posterior_sha256")),
-    ):
-        if found and own:
-            _require_equal(path, {key: found}, {key: own}, (key,))
+    require_same_records(path, result, about)
+    _require_equal(path, result, about, ("unit_sha256", *(("version",) if version else ())))
+    _require_alike(path, "k", result["options"].get("k"), about["options"].get("k"))
+
+
+def require_same_records(path: Path, result: dict, about: dict) -> None:
+    """BadInput unless the result at ``path`` is of the unit and the data of an indicators object, and of its posterior where it
+    says on which it rests."""
+    _require_equal(path, result, about, ("unit", "data_sha256"))
+    _require_alike(path, "posterior_sha256", result.get("posterior_sha256"), about.get("posterior_sha256"))
+
+
+def _require_alike(path, key, found, own):
+    if found and own:
+        _require_equal(path, {key: found}, {key: own}, (key,))
 
 
 _NAMES = {

@@ -8,21 +8,26 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.report import (
     acceptance_section,
     blind_section,
+    check_section,
     comparison_section,
     diagnosis_section,
     fit_section,
     fleet_section,
     pool_section,
+    prediction_section,
 )
 from backdrive_bayes.report.blocks import Chapter
 from backdrive_bayes.results import (
+    CHECK,
     DIAGNOSIS,
     INDICATORS,
+    PREDICTION,
     VERDICT,
     read_groups,
     read_result,
     require_own_posterior,
     require_same_data,
+    require_same_records,
 )
 
 SECTIONS = {
@@ -30,6 +35,8 @@ SECTIONS = {
     "comparison.json": comparison_section.chapter,
     "indicators.json": fit_section.chapter,
     "diagnosis.json": diagnosis_section.chapter,
+    "prediction.json": prediction_section.chapter,
+    "check.json": check_section.chapter,
     "blind.json": blind_section.chapter,
     "fleet.json": fleet_section.chapter,
     "pool.json": pool_section.chapter,
@@ -50,7 +57,7 @@ def chapters(folder: Path) -> list[Chapter]:
 
 
 def _require_one_unit(folder: Path) -> None:
-    """BadInput where fit, diagnosis and verdict of a folder do not belong together."""
+    """BadInput where what a folder holds of one unit does not belong together."""
     schemas = {"indicators.json": INDICATORS, "diagnosis.json": DIAGNOSIS, "verdict.json": VERDICT}
     found = {name: read_result(folder / name, schema) for name, schema in schemas.items() if (folder / name).exists()}
     path = folder / "posterior.nc"
@@ -60,6 +67,9 @@ def _require_one_unit(folder: Path) -> None:
         about = next(iter(found.values()))
         # A verdict rests on the fit, whichever version made that.
         require_same_data(folder / name, result, about, version=name == "diagnosis.json" and "indicators.json" in found)
+    for name, schema in {"prediction.json": PREDICTION, "check.json": CHECK}.items():
+        if found and (folder / name).exists():
+            require_same_records(folder / name, read_result(folder / name, schema), next(iter(found.values())))
 
 
 def _chapter(make, path: Path) -> Chapter:

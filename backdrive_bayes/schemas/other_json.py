@@ -20,7 +20,8 @@ class History(Struct):
 class PredictionFile(Result, kw_only=True):
     """prediction.json, beside prediction.csv: what it rests on.
 
-    ``notes`` say what was guessed or mended in the history, ``caveat`` how far its rate and torque are from those measured.
+    ``notes`` say what was guessed or mended in the history, ``caveat`` how far its rate and torque are from those measured;
+    ``prediction_sha256`` is of the curve.
     """
 
     schema: Literal["backdrive-bayes/prediction/1"]
@@ -28,6 +29,7 @@ class PredictionFile(Result, kw_only=True):
     reason: str
     history: History
     posterior_sha256: Digest
+    prediction_sha256: Digest
     notes: list[str] = field(default_factory=list)
     caveat: str = ""
 
