@@ -16,8 +16,8 @@ SHAPES = ("normal", "lognormal", "gamma")
 FEWEST_UNITS = 3
 """Of which a mean and a standard deviation are made."""
 NODES, PIECES = 40, 24
-REACH = 9.0
-"""Standard deviations beyond which nothing is integrated."""
+REACH, BEYOND = 9.0, 1e-15
+"""Standard deviations of a measurement, and probability of the process, beyond which nothing is integrated."""
 
 
 @dataclass(frozen=True)
@@ -110,16 +110,14 @@ def process_of_batch(estimates, uncertainties) -> Process:
 
 
 def _regions(process, uncertainty, limit, *intervals):
-    """Pieces (low, high) of the process's support within and beyond the limit, cut where an integrand bends."""
+    """Pieces (low, high) of the process's support within and beyond the limit, cut at quantiles and where an integrand bends."""
     d = process.distribution
-    low, high = max(process.mean - 40 * process.sd, d.support()[0]), process.mean + 40 * process.sd
-    low, high = max(low, float(d.ppf(1e-15))), min(high, float(d.isf(1e-15)))
-    bends = [low, high]
+    bends = [*d.ppf(np.r_[BEYOND, np.arange(1, PIECES) / PIECES]), float(d.isf(BEYOND))]
+    low, high = bends[0], bends[-1]
     for lo_hi in (limit, *(i for i in intervals if i is not None)):
         for edge in lo_hi:
             if np.isfinite(edge):
                 bends += [edge + s * uncertainty for s in (-REACH, -2, 0, 2, REACH)]
-    bends += list(np.linspace(low, high, PIECES + 1))
     bends = np.unique(np.clip(bends, low, high))
     pieces = list(zip(bends[:-1], bends[1:], strict=True))
     within = [p for p in pieces if limit[0] <= 0.5 * (p[0] + p[1]) <= limit[1]]
@@ -127,18 +125,21 @@ def _regions(process, uncertainty, limit, *intervals):
 
 
 def _mass(pieces, process, uncertainty=None, interval=None, complement=False) -> float:
-    """∫ g₀(η) P(estimate in interval | η) dη over ``pieces`` by Gauss-Legendre."""
+    """∫ g₀(η) P(estimate in interval | η) dη over ``pieces`` by Gauss-Legendre over the probability of η: a density may have no
+    bound, as that of a gamma process wider than its mean."""
     if uncertainty is not None and interval is None:
         return _mass(pieces, process) if complement else 0.0
+    d, total = process.distribution, 0.0
     node, weight = np.polynomial.legendre.leggauss(NODES)
-    total = 0.0
-    for a, b in pieces:
-        x = 0.5 * (b - a) * node + 0.5 * (a + b)
-        value = process.distribution.pdf(x)
+    for ends in pieces:
+        # From the end that is near, or nothing is left of small probabilities.
+        to, back = (d.sf, d.isf) if ends[0] >= d.median() else (d.cdf, d.ppf)
+        a, b = to(ends)
+        value = 1.0
         if uncertainty is not None:
-            lo, hi = ((edge - x) / uncertainty for edge in interval)
+            lo, hi = ((edge - back(0.5 * (b - a) * node + 0.5 * (a + b))) / uncertainty for edge in interval)
             inside = stats.norm.cdf(hi) - stats.norm.cdf(lo)
             # Outside of an interval that holds nothing, as (inf, -inf), is everything, once.
-            value = value * (np.minimum(stats.norm.cdf(lo) + stats.norm.sf(hi), 1.0) if complement else inside)
-        total += 0.5 * (b - a) * float(weight @ value)
+            value = np.minimum(stats.norm.cdf(lo) + stats.norm.sf(hi), 1.0) if complement else inside
+        total += 0.5 * abs(float(b - a)) * float(np.sum(weight * value))
     return float(total)

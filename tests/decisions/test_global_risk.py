@@ -66,6 +66,21 @@ def test_against_a_double_integral_over_process_and_reading(shape):
     assert d.mean() == pytest.approx(1.0) and d.std() == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize(("shape", "sd"), [("gamma", 1.5), ("gamma", 4.0), ("lognormal", 6.0)])
+def test_a_process_wider_than_its_mean_keeps_all_its_mass(shape, sd):
+    """Integrated over the quantity itself (planted fault), most of a density that is not bounded at zero, or ends far out, is
+    missed."""
+    process = Process(1.0, sd, shape)
+    d, rng = process.distribution, np.random.default_rng(4)
+    risks = global_risks(process, 0.1, (-INF, 2.0), (-INF, 1.9))
+    assert risks.accepted + risks.rejected == pytest.approx(1.0, abs=1e-9)
+    assert risks.nonconforming == pytest.approx(d.sf(2.0), rel=1e-9)
+    truth = d.rvs(400_000, random_state=rng)
+    reading = truth + rng.normal(0, 0.1, truth.size)
+    for found, hits in ((risks.consumer, (truth > 2) & (reading <= 1.9)), (risks.producer, (truth <= 2) & (reading > 1.9))):
+        assert found == pytest.approx(hits.mean(), abs=4 * np.sqrt(max(found, 1e-6) / truth.size))
+
+
 def test_against_simulated_production():
     rng = np.random.default_rng(3)
     truth = rng.normal(1.0, 0.2, 400_000)
