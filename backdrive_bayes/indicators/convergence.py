@@ -10,6 +10,7 @@ from scipy.integrate import trapezoid
 from backdrive_bayes.engine.diagnostics import diagnose_draws
 from backdrive_bayes.engine.posterior import Posterior
 from backdrive_bayes.engine.posterior_file import as_saved
+from backdrive_bayes.engine.predictive import covariances_rad2
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
 from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad
 from backdrive_bayes.indicators.intervals import ends
@@ -22,7 +23,7 @@ LEVEL, STANDARD_ERRORS = 0.9, 3.0
 """Level of the interval that is held against a measured value, whatever level is shown, and by how many of the value's standard
 errors it is widened."""
 SHARE = {"settled": 0.05, "first": 0.3}
-"""Share of a measured value by which the interval is widened; a cycle from rest is not the settled loop."""
+"""Share of a measured value by which the interval is widened; a first cycle is read once, along one leg of the settled loop."""
 
 
 def _width_as_read(loops: Loops, zero_nm: float) -> np.ndarray:
@@ -55,21 +56,39 @@ def examined(draws: IndicatorDraws, unit: Unit | None = None) -> Posterior:
 
 def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, ...]) -> list[str]:
     """One sentence for every measured number that the posterior's interval does not hold, with both numbers."""
-    found = []
+    found, covariances = [], covariances_rad2(draws.posterior)
     for record, loop in enumerate(measured):
         if loop is None:
             continue
         loops = _reached(draws, record).late(_lag_nm(draws, record))
         for name, text, unit, function in CHECKED:
-            value = getattr(loop, name)
+            value, sd, draws_of = getattr(loop, name), getattr(loop, f"{name}_sd"), function(loops, loop)
             if value is None:
                 continue
-            lo, hi = np.quantile(function(loops, loop), ends(LEVEL)[::2])
-            room = STANDARD_ERRORS * getattr(loop, f"{name}_sd") + SHARE[loop.basis] * abs(value)
+            if name == "loop_area_j" and loop.basis == "first":
+                left, sd = _left_by_leg(draws.posterior, record, covariances[record])
+                value = float(np.median(draws_of)) + left
+            lo, hi = np.quantile(draws_of, ends(LEVEL)[::2])
+            room = STANDARD_ERRORS * sd + SHARE[loop.basis] * abs(value)
             if not lo - room <= value <= hi + room:
                 inferred = f"inferred as {lo:.4g} to {hi:.4g} {unit}"
                 found.append(f"{text} of {loop.record} was measured as {value:.4g} {unit}, {inferred}")
     return found
+
+
+def _left_by_leg(posterior, record, covariance_rad2) -> tuple[float, float]:
+    """What the longest leg of a record encloses with its mirror image beyond what the mode predicts of that leg, and its standard
+    error [J]: of a first cycle only that leg is of the settled loop, whatever was before."""
+    blocks = posterior.records.blocks[record]
+    ways = np.abs(np.diff(blocks.turning_nm))
+    own = blocks.leg == int(np.argmax(ways))
+    torque = blocks.torque_nm[own]
+    # Its area with that image is twice the one between the curve and its chord.
+    step = np.diff(torque)
+    weight = np.r_[step, 0.0] + np.r_[0.0, step]
+    weight[[0, -1]] -= torque[-1] - torque[0]
+    left = blocks.angle_rad[own] - posterior.predicted_rad[record][own]
+    return -float(weight @ left), float(np.sqrt(weight @ covariance_rad2[np.ix_(own, own)] @ weight))
 
 
 def _reached(draws, record) -> Loops:

@@ -10,7 +10,7 @@ from support.made_posterior import known, made_posterior
 from backdrive_bayes.bench.known_truth import KnownReducer, simulate_unit
 from backdrive_bayes.indicators.convergence import SHARE, _width_as_read, contradictions, convergence_json, examined
 from backdrive_bayes.indicators.draws import CORE, IndicatorDraws
-from backdrive_bayes.indicators.indicators import peak_angle_rad, zero_torque_width_rad
+from backdrive_bayes.indicators.indicators import loop_area_j, peak_angle_rad, zero_torque_width_rad
 from backdrive_bayes.records.branches import find_segments
 from backdrive_bayes.records.measured_loop import measured_loops
 from backdrive_bayes.records.noise import estimate_noise
@@ -32,7 +32,7 @@ def fitted_to(truth, record):
     blocks = reduce_record(record, segments, noise, 40)
     posterior = made_posterior(truth, LOOPS[:1], shape=(4, 50))
     facts = replace(posterior.records, blocks=(blocks,), amplitude_nm=np.array([blocks.amplitude_nm]))
-    return replace(posterior, records=facts)
+    return replace(posterior, records=facts, predicted_rad=(blocks.angle_rad,))
 
 
 def judged(truth, unit, **options):
@@ -78,6 +78,32 @@ def test_a_loop_off_centre_is_compared_with_itself():
     assert blocks.tips_nm == pytest.approx((low, high), rel=0.02)
     whole = peak_angle_rad(draws.loops(rate, blocks.amplitude_nm)).mean()
     assert abs(measured[0].half_peak_to_peak_rad / whole - 1.0) > SHARE["settled"]
+
+
+@pytest.mark.parametrize(("change", "doubted"), [({}, False), ({"drag": 0.09}, True)], ids=["right", "wrong"])
+def test_of_a_first_cycle_the_leg_between_the_tips_counts(change, doubted):
+    """Unloaded from the tip that it goes to first, it encloses half as much as the settled loop: no contradiction, though with its
+    whole area (planted fault) it is one. A leg that does enclose something else is one."""
+    truth, rate, rng = known(), 0.05, np.random.default_rng(5)
+    corner = np.array([0.1, 0.0, 0.1, -0.1, 0.0])
+    at = np.r_[0.0, np.cumsum(np.abs(np.diff(corner)))] / rate
+    time = np.arange(0.0, at[-1], 1 / 200.0)
+    torque, after = np.interp(time, at, corner), time >= at[1]
+
+    def read(reducer, noise_rad, noise_nm):
+        angle = reducer.angle_rad(np.r_[-4.0, -2.0, time], np.r_[0.0, 0.1, torque])[2:][after]
+        angle = angle + noise_rad * rng.standard_normal(angle.size)
+        return Record("a.csv", time[after], torque[after] + noise_nm * rng.standard_normal(angle.size), angle, rate, None)
+
+    record, wrong = read(known(), 5e-5, 1e-4), known(**change)
+    posterior = fitted_to(wrong, record)
+    blocks = posterior.records.blocks[0]
+    exact = np.interp(blocks.mid_s, time[after], read(wrong, 0.0, 0.0).angle_rad)
+    draws = IndicatorDraws(replace(posterior, predicted_rad=(exact,)), 0.03)
+    (measured,) = measured_loops(Unit("u", 0.1, (record,)))
+    settled = loop_area_j(IndicatorDraws(fitted_to(truth, record), 0.03).loops(rate, blocks.amplitude_nm)).mean()
+    assert measured.basis == "first" and measured.loop_area_j < (1.0 - SHARE["first"]) * settled
+    assert any("loop area S" in text for text in contradictions(draws, (measured,))) == doubted
 
 
 def test_a_step_next_to_zero_torque_is_compared_as_it_was_read():
