@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numba
@@ -53,6 +53,10 @@ class History:
         largest = max(np.abs(self.z0).max(), np.abs(self.z1).max()) if self.largest is None else self.largest
         return float(np.log(max(largest, 1e-3)))
 
+    def beside(self, offset: float) -> History:
+        """The same at torques that are larger by ``offset``."""
+        return replace(self, z0=self.z0 + offset, z1=self.z1 + offset)
+
     def mean(self, begin, end) -> np.ndarray:
         """Block means (blocks, columns) of quantities that are straight on every segment, given at its ends
         (segments, columns)."""
@@ -61,11 +65,8 @@ class History:
         return out
 
 
-def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s: float = 0.0) -> History:
-    """History behind the blocks of a record.
-
-    ``offset`` is added to the torque that was read (a share of the scale), ``lag_s`` is by how much the angle channel is late.
-    """
+def of_blocks(blocks: Blocks, torque_scale_nm: float, lag_s: float = 0.0) -> History:
+    """History behind the blocks of a record; ``lag_s`` is by how much the angle channel is late."""
     sampled, who = _samples(blocks)
     sampled, many, ends = sampled - lag_s, blocks.count > FEW, np.r_[blocks.begin_s[0], blocks.end_s[-1]]
     edges = np.r_[blocks.begin_s[many], blocks.end_s[many], ends] - lag_s
@@ -81,7 +82,7 @@ def of_blocks(blocks: Blocks, torque_scale_nm: float, offset: float = 0.0, lag_s
     t0, t1 = np.r_[cuts[:-1], sampled], np.r_[cuts[1:], sampled]
     owner, weight = np.r_[owner, who], np.r_[weight, 1.0 / blocks.count[who]]
     order = np.lexsort((t0, t1))
-    z0, z1 = (np.interp(t[order], blocks.path_s, blocks.path_nm) / torque_scale_nm + offset for t in (t0, t1))
+    z0, z1 = (np.interp(t[order], blocks.path_s, blocks.path_nm) / torque_scale_nm for t in (t0, t1))
     surge = _surge(*path, np.stack([t0[order], t1[order]]), usual)
     # A tip is reached from the other side.
     state = "neutral" if not blocks.begins_at_tip else "lower" if blocks.turning_nm[0] > 0 else "upper"

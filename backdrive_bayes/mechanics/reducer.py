@@ -10,6 +10,7 @@ knots.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -124,6 +125,12 @@ class ReducerClass:
 def _cells(part, growth) -> Cells:
     friction, drag, before = growth
     own = friction if part.name in GROWING[0] else drag if part.name in GROWING[1] else 0.0
+    return part.cells.grown(own, before) if np.ndim(own) or np.ndim(before) else _steady(part, own, before)
+
+
+@lru_cache(maxsize=1024)
+def _steady(part, own: float, before: float) -> Cells:
+    """Cells that grow alike all along a history: those of a mode are wanted for every record and derivative."""
     return part.cells.grown(own, before)
 
 

@@ -47,7 +47,8 @@ def test_weights_of_a_block_sum_to_one():
 
 
 def test_an_offset_is_added_to_what_was_read():
-    moved, still = of_blocks(ramped(), SCALE, 0.02), of_blocks(ramped(), SCALE)
+    still = of_blocks(ramped(), SCALE)
+    moved = still.beside(0.02)
     np.testing.assert_allclose(moved.z1 - still.z1, 0.02)
     assert moved.start == pytest.approx(0.02)
 
@@ -72,7 +73,7 @@ def test_turning_points_are_kept(lag):
 
 
 def test_segments_join():
-    history = of_blocks(ramped(), SCALE, 0.01, 0.02)
+    history = of_blocks(ramped(), SCALE, 0.02).beside(0.01)
     assert np.array_equal(history.z0[1:], history.z1[:-1]) and np.array_equal(history.t0[1:], history.t1[:-1])
     assert np.all(history.t1 > history.t0) and np.all(np.diff(history.block) >= 0)
 
