@@ -32,6 +32,9 @@ from backdrive_bayes.mechanics.registry import LIBRARY, library_terms
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.unit_folder import read_unit
 
+COARSE = 100
+"""Blocks a leg, half as many as usual, where whole searches are run: in half the time."""
+
 
 def mode(**options):
     return joint_mode(reduce_unit(planted(**options)), library_terms())
@@ -236,14 +239,14 @@ def test_a_clean_unit_has_one_mode_and_an_offset_adds_those_without_and_with_it_
 
 
 def test_two_that_act_together_have_a_mode_of_their_own_which_is_the_likeliest():
-    found = linearise(reduce_unit(planted(offset_nm=8e-4, lag_s=0.03, loops=MORE)), library_terms())[1:]
+    found = linearise(reduce_unit(planted(offset_nm=8e-4, lag_s=0.03, loops=MORE), COARSE), library_terms())[1:]
     traces = [trace_levels(m.reduced, m.design, m.effects) for m in found]
     acts = [{n for n in BENDING if n in t and m.log_scale[n] > np.log(t[n]) + 0.1} for m, t in zip(found, traces, strict=True)]
     assert acts[int(np.argmax([m.log_marginal for m in found]))] >= {"torque_offset", "sensor_lag"}
 
 
 def test_friction_that_follows_the_rate_is_found_at_its_own_mode():
-    found = linearise(reduce_unit(planted(known=_rough_reducer(3.0), exponent=0.4, loops=MORE)), library_terms())
+    found = linearise(reduce_unit(planted(known=_rough_reducer(3.0), exponent=0.4, loops=MORE), COARSE), library_terms())
     # At the joint mode a creep may stand for it; where it may not act, a wander of the reading as well.
     exponents = np.sort([m.distortion.friction_exponent for m in found[1:]])
     assert exponents[[0, -1]] == pytest.approx([0.0, 0.4], abs=0.05) and np.abs(exponents[:-1]).max() < 0.05
@@ -251,7 +254,7 @@ def test_friction_that_follows_the_rate_is_found_at_its_own_mode():
 
 def test_a_law_of_the_rate_is_found_though_a_creep_may_stand_for_it():
     """Of two rates, where the law may act and where it may not."""
-    found = linearise(reduce_unit(planted(known=_rough_reducer(6.0), exponent=0.4)), library_terms())
+    found = linearise(reduce_unit(planted(known=_rough_reducer(6.0), exponent=0.4), COARSE), library_terms())
     exponents = [m.distortion.friction_exponent for m in found]
     assert max(exponents) == pytest.approx(0.4, abs=0.1) and min(exponents) < 0.1
 
@@ -261,7 +264,7 @@ def test_a_drag_at_the_shaft_is_found_and_is_no_lag():
     lag, which is named one)."""
 
     def weighed(**fault):
-        return weigh(linearise(reduce_unit(planted(loops=MORE, known=smooth_reducer(), **fault)), library_terms()))
+        return weigh(linearise(reduce_unit(planted(loops=MORE, known=smooth_reducer(), **fault), COARSE), library_terms()))
 
     drag, falling, lag = weighed(drag_nm=2e-3), weighed(drag_nm=-2e-3), weighed(lag_s=0.02)
     for found, planted_nm in ((drag, 2e-3), (falling, -2e-3)):
@@ -284,7 +287,7 @@ def test_a_law_of_the_rate_is_told_from_one_of_the_amplitude_by_two_rates_of_one
 
     def factor(*loops, seed=0):
         unit = planted(seed, known=_rough_reducer(4.0), exponent=0.2, loops=loops)
-        return weigh(linearise(reduce_unit(unit), library_terms())).log_factor[(LAW,)]
+        return weigh(linearise(reduce_unit(unit, COARSE), library_terms())).log_factor[(LAW,)]
 
     confounded = [factor((0.1, 0.02), (0.05, 0.1), seed=seed) for seed in range(3)]
     rare = 0.5 * (0.2 * np.log(5.0) / np.log(2.0) / noncongruent_loops.USUAL) ** 2

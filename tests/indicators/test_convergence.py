@@ -82,8 +82,8 @@ def test_a_loop_off_centre_is_compared_with_itself():
 
 @pytest.mark.parametrize(("change", "doubted"), [({}, False), ({"drag": 0.09}, True)], ids=["right", "wrong"])
 def test_of_a_first_cycle_the_leg_between_the_tips_counts(change, doubted):
-    """Unloaded from the tip that it goes to first, it encloses half as much as the settled loop: no contradiction, though with its
-    whole area (planted fault) it is one. A leg that does enclose something else is one."""
+    """Unloaded from the tip that it goes to first, it encloses half as much as the settled loop: no contradiction, though with
+    its whole area (planted fault) it is one. A leg that does enclose something else is one."""
     truth, rate, rng = known(), 0.05, np.random.default_rng(5)
     corner = np.array([0.1, 0.0, 0.1, -0.1, 0.0])
     at = np.r_[0.0, np.cumsum(np.abs(np.diff(corner)))] / rate
