@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy.special import ndtr
 
 from backdrive_bayes.errors import BadInput
 from backdrive_bayes.mechanics.cells import Cells
@@ -28,9 +29,9 @@ GROWING = (FRICTION, ("clearance",), EVERY)
 """Parts whose thresholds follow the rate and the amplitude: of friction, and drags; and those behind a drag at the shaft."""
 GROWING_MODULES = ("friction", "geometric")
 """Modules of the first two of them."""
-SHIFTS = 7
-"""Growths of the draws at which responses are made, those between are interpolated: their quantiles, from least to largest, the
-inner ones half a standard deviation apart."""
+SHIFTS = np.r_[0.0, ndtr(0.75 * np.arange(-3, 4)), 1.0]
+"""Quantiles of the draws' growths at which responses are made, those between are interpolated: of normal ones the inner quantiles
+are three quarters of a standard deviation apart, so that the ends of an interval, too, lie between near ones."""
 UNGROWN = (0.0, 0.0, 0.0)
 """Growth where nothing grows."""
 GROWTH_STEPS = (2e-3, 2e-3, 2e-5)
@@ -95,7 +96,7 @@ class ReducerClass:
             ends = (_cells(p, grown).ends(history) @ p.weights(weights[p.name]) for p in own)
             return sum(ends, np.zeros(history.z1.size))
 
-        nodes = np.unique(np.r_[0.0, np.quantile(shifts, np.linspace(0.0, 1.0, SHIFTS))])
+        nodes = np.unique(np.r_[0.0, np.quantile(shifts, SHIFTS)])
         between = np.stack([np.interp(shifts, nodes, share) for share in np.eye(nodes.size)], axis=1)
         return between @ (np.stack([response(node) for node in nodes]) - response(0.0))
 
