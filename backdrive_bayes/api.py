@@ -29,6 +29,7 @@ from backdrive_bayes.decisions.limits import Limits, read_limits
 from backdrive_bayes.decisions.outcome import line
 from backdrive_bayes.decisions.pool import Pool
 from backdrive_bayes.engine.posterior import Posterior
+from backdrive_bayes.errors import BadInput
 from backdrive_bayes.indicators.loads import loads_json
 from backdrive_bayes.number_text import probability_text
 from backdrive_bayes.records import record
@@ -233,14 +234,14 @@ def compare(*fitted, claims=None, rope: float = ROPE, seed: int = 0) -> Comparis
 
 
 def report(*results, out: Path | str, template: Path | str | None = None) -> Path:
-    """Save the results (or take folders that hold some) below ``out`` and make out/report.pdf of them.
-
-    ``template`` is a folder with a company's template.toml and logo.
-    """
+    """Save the results (or take folders that hold some) below ``out`` and make out/report.pdf of them, dressed in a company's
+    ``template``, a folder with template.toml and logo."""
     from backdrive_bayes.commands.report import NAME, read_template
     from backdrive_bayes.report.report import write_report
 
     folders = []
+    if not results or not all(isinstance(r, str | Path | Fit | Diagnosis | Verdict | Comparison) for r in results):
+        raise BadInput("report", "results or folders that hold some", repr(results)[:200])
     for number, result in enumerate(results, 1):
         own = Path(out) / f"{number}-{type(result).__name__.lower()}"
         folders.append(Path(result) if isinstance(result, str | Path) else result.save(own, figures=False))
@@ -270,8 +271,8 @@ def _evidence(fitted, k: float = FitOptions.k, examined: bool = False) -> Eviden
         return fitted
     if not isinstance(fitted, record.Unit) and is_result(Path(fitted)):
         return Evidence.read(Path(fitted))
-    found = fit(fitted, k=k).evidence
-    return replace(found, diagnosis=diagnose(fitted, k=k).result) if examined else found
+    own = fit(fitted, k=k).evidence
+    return replace(own, diagnosis=diagnose(fitted, k=k).result) if examined else own
 
 
 def _save(result, name, folder, figures):

@@ -68,12 +68,14 @@ def run(args) -> int:
 
 def _evidences(args, options):
     """Evidence of every unit in order, and the new fits by the name of their folder."""
+    from backdrive_bayes.decisions.comparison import require_own_records
     from backdrive_bayes.decisions.evidence import Evidence
 
     # Whatever cannot be read is said before the first unit is sampled.
     force = getattr(args, "force", False)
     units = [Evidence.read(path) if is_result(path) else ready_unit(path, options.k, force) for path in args.units]
-    _require_own_records(args.units, units)
+    hashes = (u.unit.data_sha256 if hasattr(u, "unit") else u.about["data_sha256"] for u in units)
+    require_own_records(zip(args.units, hashes, strict=True))
     evidences, made = [], {}
     for ready in units:
         if isinstance(ready, Evidence):
@@ -89,16 +91,6 @@ def _evidences(args, options):
         name = default_out(unit.name, "fit").name
         made[name if name not in made else f"{name}-{len(made) + 1}"] = posterior, result
     return evidences, made
-
-
-def _require_own_records(paths, units) -> None:
-    """BadInput where two results or units have a record in common: their draws are not independent."""
-    hashes = [u.unit.data_sha256 if hasattr(u, "unit") else u.about["data_sha256"] for u in units]
-    seen: dict = {}
-    for path, own in zip(paths, hashes, strict=True):
-        for digest in own:
-            if (first := seen.setdefault(digest, path)) is not path:
-                raise BadInput("compare", "units of different records", f"the same records in '{first}' and '{path}'")
 
 
 def _summarise(result: dict, out: Path) -> None:

@@ -8,6 +8,7 @@ import os
 import platform
 import time
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 
 from backdrive_bayes.commands.door import add_force_argument, ready_unit
@@ -43,6 +44,9 @@ class FitOptions:
         known = BASELINE.split(",")
         if not set(self.baseline) <= set(known) or "elastic" not in self.baseline:
             raise BadInput("--baseline", f"modules out of {', '.join(known)}, elastic among them", ",".join(self.baseline))
+        if isinstance(self.seed, bool) or not isinstance(self.seed, Integral) or not 0 <= self.seed < 10**18:
+            raise BadInput("--seed", "a whole number from 0 of at most 18 digits", repr(self.seed))
+        object.__setattr__(self, "seed", int(self.seed))
         if not 0 < self.k < 1:
             raise BadInput("--k", "a number between 0 and 1", self.k)
         if not 0 < self.level <= HIGHEST_LEVEL:

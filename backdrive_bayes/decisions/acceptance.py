@@ -151,6 +151,8 @@ def _verdict(structure: Structure, risks: Risks, limits: Limits) -> tuple[Verdic
     if bad:
         advised = bad[0].about["convergence"].get("advice") or "check the records"
         return Verdict.INCONCLUSIVE, f"the fit is not to be used: {advised}"
+    if not all(m.evidence.usable for m in structure.models):
+        return Verdict.INCONCLUSIVE, "the check finds the data unfit and was overruled: nothing is decided on them"
     verdict = risks.verdict(limits.consumer, limits.producer)
     if verdict is Verdict.ACCEPTED:
         return verdict, f"the risk that it is out of limits, {_p(risks.consumer)}, is at most the agreed {_p(limits.consumer)}"
@@ -195,7 +197,7 @@ def _row(structure: Structure, judged: Judged, within: float, limits: Limits, ba
         "monte_carlo_error": monte_carlo_error(risks.conformance, effective),
         "specific_consumer_risk": risks.consumer,
         "specific_producer_risk": risks.producer,
-        "verdict": risks.verdict(limits.consumer, limits.producer).value if first.converged else Verdict.INCONCLUSIVE.value,
+        "verdict": risks.verdict(limits.consumer, limits.producer).value if first.usable else Verdict.INCONCLUSIVE.value,
         "guard_band": {"below_max": upper, "above_min": lower},
         "accept_median_between": _accepted(limit, mixed, limits.consumer),
         "naive": _naive(first, limit, loop),
@@ -260,7 +262,7 @@ def _next(structure, verdict, rows: list[dict], limiting: int, limits: Limits, t
     if verdict is not Verdict.INCONCLUSIVE:
         return None
     row, repeats = rows[limiting], None
-    if not all(m.evidence.converged for m in structure.models):
+    if not all(m.evidence.usable for m in structure.models):
         text = _unusable(structure)
     elif structure.unknown > min(limits.consumer, limits.producer):
         test = (structure.models[0].evidence.diagnosis or {}).get("next_test") or {}
@@ -280,6 +282,8 @@ def _next(structure, verdict, rows: list[dict], limiting: int, limits: Limits, t
 
 
 def _unusable(structure: Structure) -> str:
+    if all(m.evidence.converged for m in structure.models):
+        return "Mend what the check finds in the data, then fit them without --force."
     convergence = next(m.evidence.about["convergence"] for m in structure.models if not m.evidence.converged)
     if convergence.get("contradictions"):
         return "Check the records: the posterior contradicts what was measured, so the model does not fit these data."

@@ -33,15 +33,30 @@ class Matched:
     second: Loop
 
 
+def require_own_records(units) -> None:
+    """BadInput where two ``units``, pairs of what they are called and the hashes of their records, have a record in common: their
+    draws are not independent."""
+    seen: dict = {}
+    for number, (name, hashes) in enumerate(units):
+        for digest in hashes:
+            first, other = seen.setdefault(digest, (number, name))
+            if first != number:
+                raise BadInput("compare", "units of different records", f"the same records in '{other}' and '{name}'")
+
+
 @one_thread()
 def compare(evidences, claims: Claims | None = None, rope: float = ROPE, level: float = 0.9, seed: int = 0) -> dict:
     """The comparison object of two or more units.
 
-    ``rope`` is the relative difference that counts as none. Raises BadInput where no two units have a condition in common.
+    ``rope`` is the relative difference that counts as none. Raises BadInput where no two units have a condition in common, or two
+    have a record in common.
     """
     evidences = list(evidences)
     if len(evidences) < 2:
         raise BadInput("compare", "two units or more", f"{len(evidences)}")
+    if not 0 < rope < 1:
+        raise BadInput("rope", "a share between 0 and 1", rope)
+    require_own_records((e.where or e.name, e.about["data_sha256"]) for e in evidences)
     names = unique_names(evidences)
     rng = np.random.default_rng([seed, 3])
     pairs = [_pair(a, b, names, evidences, rope, level, rng) for a, b in combinations(range(len(evidences)), 2)]

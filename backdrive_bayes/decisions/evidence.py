@@ -123,6 +123,11 @@ class Evidence:
         return self.about["unit"]
 
     @property
+    def usable(self) -> bool:
+        """Whether it converged on data that the check found fit."""
+        return self.converged and not self.about.get("forced")
+
+    @property
     def converged(self) -> bool:
         """Whether the sampling converged and the measurement does not contradict."""
         return bool(self.about["convergence"]["converged"])

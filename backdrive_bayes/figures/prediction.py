@@ -17,7 +17,7 @@ CAPTION = (
 )
 FILE, COLUMNS = "prediction.json", ("time_s", "torque_Nm", "angle_mean_arcmin", "angle_lo90_arcmin", "angle_hi90_arcmin")
 SHOWN = 4000
-"""Samples that are drawn of a longer history."""
+"""Samples that are drawn of a longer history, evenly taken, beside the extremes between them."""
 
 
 def read_prediction(folder: Path) -> tuple[dict, np.ndarray]:
@@ -34,7 +34,7 @@ def read_prediction(folder: Path) -> tuple[dict, np.ndarray]:
 
 def prediction_figures(curve: np.ndarray) -> dict[str, Figure]:
     """The figure of a predicted curve (samples, columns) by name."""
-    shown = curve[np.unique(np.linspace(0, len(curve) - 1, SHOWN).astype(int))]
+    shown = curve[_drawn(curve[:, 1])]
     time, torque, *angle = (shown - [shown[0, 0], 0.0, 0.0, 0.0, 0.0]).T
     factor, unit = shown_unit("N·m", torque)
     with styled():
@@ -51,9 +51,19 @@ def prediction_figures(curve: np.ndarray) -> dict[str, Figure]:
     return settled({"prediction": figure})
 
 
+def _drawn(torque) -> np.ndarray:
+    """Numbers of the samples that are drawn: evenly taken ones, and the extremes of the torque between them."""
+    even = np.unique(np.linspace(0, torque.size - 1, SHOWN).astype(int))
+    parts = np.split(np.arange(torque.size), even[1:])
+    return np.unique([even, *([part[of(torque[part])] for part in parts] for of in (np.argmin, np.argmax))])
+
+
 def _band(panel, at, angle):
     """Between the interval's ends along the curve: a branch goes back over the same torques, each with its own piece."""
     look = {"color": BLUE, "alpha": 0.25, "linewidth": 0.0}
+    if np.ptp(at) == 0.0:
+        panel.vlines(at[:1], angle[1].min(), angle[2].max(), label="90 % interval", color=BLUE, alpha=0.25, linewidth=3.0)
+        return
     turns = np.flatnonzero(np.diff(np.sign(np.diff(at)))) + 1
     for i, (start, stop) in enumerate(zip(np.r_[0, turns], np.r_[turns, at.size - 1], strict=True)):
         own = slice(start, stop + 1)

@@ -26,7 +26,7 @@ from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
 from backdrive_bayes.records.plausible import why_unfinished
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.shape import closure, cycle_count, extremes, ramp_rate
-from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy
+from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy, width_reversed
 from backdrive_bayes.results import CHECK
 
 LOST_MOTION_SHARE = 0.03
@@ -99,6 +99,7 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
         "angle_jumps": angle_jumps(angle, segments),
         "measured_loop": None if loop is None else _si_names(asdict(loop)),
         "energy_given": gives_energy(loop, rise),
+        "width_reversed": width_reversed(loop, rise),
         "unfinished": why_unfinished(time, torque),
         "notes": list(record.notes),
     }

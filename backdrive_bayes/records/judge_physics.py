@@ -28,7 +28,17 @@ def judge_physics(found: dict, columns: dict[str, str]):
     yield from _range(found)
     loop = found["measured_loop"]
     # A frozen channel draws loops of any direction and has a finding of its own.
-    if found["energy_given"] and not any(stands_still(frozen) for frozen in found["frozen"].values()):
+    if any(stands_still(frozen) for frozen in found["frozen"].values()):
+        return
+    if found["width_reversed"] and not found["energy_given"]:
+        read, sd = (60 * _DEG * loop[key] for key in ("zero_torque_width_rad", "zero_torque_width_rad_sd"))
+        yield Finding(
+            "error",
+            "width_reversed",
+            f"at zero torque the angle is less after loading than before: w(0) = {with_error(read, sd, '′')}; no reducer does that, "
+            "but an encoder that wraps or slips, or a channel that was held",
+        )
+    if found["energy_given"]:
         area = with_error(1e3 * loop["loop_area_J"], 1e3 * loop["loop_area_J_sd"])
         yield Finding(
             "error",

@@ -13,6 +13,7 @@ from backdrive_bayes.records.wraps import find_jumps
 _LONG = 0.5  # of the longest ramp: shorter ones say little of the slope
 _END_SHARE = 0.1  # of a ramp's samples at either end
 _SURE_SD = 4.0
+_REVERSED = 0.2  # of half the angle between the tips: waves of an encoder and drifts stay below
 
 
 def angle_rise(torque_nm: np.ndarray, angle_rad: np.ndarray, segments, noise) -> dict:
@@ -55,6 +56,15 @@ def inverted(rise: dict, angle_range_rad: float) -> bool:
 def not_answering(rise: dict, angle_range_rad: float) -> bool:
     """Whether rising and falling ramps together do not raise the angle, although it moves."""
     return rise["rise_rad"] <= max(_SURE_SD * rise["sd_rad"], 0.02 * angle_range_rad) and not inverted(rise, angle_range_rad)
+
+
+def width_reversed(loop: MeasuredLoop | None, rise: dict) -> bool:
+    """Whether at zero torque the measured cycle is passed the wrong way beyond noise, by more than waves and drifts make: no
+    reducer turns further before it was loaded than after."""
+    if loop is None or loop.zero_torque_width_rad is None or rise["rise_rad"] <= 0.0:
+        return False
+    sd = loop.zero_torque_width_rad_sd or 0.0
+    return loop.zero_torque_width_rad < -max(_SURE_SD * sd, _REVERSED * abs(loop.half_peak_to_peak_rad))
 
 
 def gives_energy(loop: MeasuredLoop | None, rise: dict) -> bool:

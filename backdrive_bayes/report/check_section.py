@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backdrive_bayes.figures.style import MJ_PER_J, words
+from backdrive_bayes.figures.style import MJ_PER_J, shortened, words
 from backdrive_bayes.number_text import ARCMIN_PER_RAD, plain, significant, with_error
 from backdrive_bayes.report.blocks import Banner, Chapter, Facts, Heading, Note, Table
 from backdrive_bayes.report.text import digests, free
@@ -48,7 +48,7 @@ def _record(record):
     closure = record["closure"]
     found = (record[key]["estimated"] for key in ("amplitude_Nm", "loading_rate_Nm_per_s"))
     return [
-        free(record["record"], 40),
+        free(shortened(record["record"], 40)),
         str(record["samples"]),
         plain(record["duration_s"]),
         *(significant(value) for value in found),
@@ -72,17 +72,17 @@ def _cycle(record):
     levels = (("white_rad", ARCMIN_PER_RAD), ("correlated_rad", ARCMIN_PER_RAD), ("torque_Nm", 1e3))
     read = (("loop_area_J", MJ_PER_J), ("half_peak_to_peak_rad", ARCMIN_PER_RAD), ("zero_torque_width_rad", ARCMIN_PER_RAD))
     return [
-        free(record["record"], 40),
+        free(shortened(record["record"], 40)),
         *(significant(noise[key], 2, factor) for key, factor in levels),
         *("–" if loop.get(key) is None else with_error(factor * loop[key], factor * loop[f"{key}_sd"]) for key, factor in read),
     ]
 
 
 def _findings(result):
-    found = result["findings"]
+    found = sorted(result["findings"], key=lambda f: ("error", "warning", "note").index(f["level"]))
     if found:
         yield Heading("Findings")
-        rows = [[f["level"], free(f["record"] or "unit", 40), free(f["text"], 400)] for f in found[:MOST_ROWS]]
+        rows = [[f["level"], free(shortened(f["record"] or "unit", 40)), free(f["text"], 400)] for f in found[:MOST_ROWS]]
         yield Table(["", "Of", "Found"], rows, [0.5, 1.0, 3.5])
         if len(found) > MOST_ROWS:
             yield Note(f"And {len(found) - MOST_ROWS} more in check.json.")

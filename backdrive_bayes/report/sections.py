@@ -50,7 +50,10 @@ def chapters(folder: Path) -> list[Chapter]:
     if not folder.is_dir():
         raise BadInput(folder, "a result folder", "no such folder")
     _require_one_unit(folder)
-    found = [_chapter(make, folder / name) for name, make in SECTIONS.items() if (folder / name).exists()]
+    there = [name for name in SECTIONS if (folder / name).exists()]
+    # What a check found is told with the fit that rests on it.
+    told = {"check.json"} if "indicators.json" in there else set()
+    found = [_chapter(SECTIONS[name], folder / name) for name in there if name not in told]
     if not found:
         raise BadInput(folder, f"a result folder with {' or '.join(SECTIONS)}", "none of them")
     return found

@@ -2,15 +2,16 @@
 
 import json
 import re
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from support.decided import diagnosis, write_evidence
 from support.made_posterior import made_fit
 
-from backdrive_bayes.commands.compare import _require_own_records
+from backdrive_bayes import api
 from backdrive_bayes.commands.main import main
 from backdrive_bayes.commands.results import HIGHEST_LEVEL, FitOptions, require_fitted_with
+from backdrive_bayes.decisions.comparison import require_own_records
 from backdrive_bayes.engine import sample
 from backdrive_bayes.errors import BadInput
 
@@ -159,10 +160,35 @@ def test_a_comparison_records_its_own_level(fits, tmp_path):
 
 def test_units_that_share_a_record_are_not_compared():
     """Not only those of the same records all: their draws are not independent."""
-    units = [SimpleNamespace(unit=SimpleNamespace(data_sha256=hashes)) for hashes in (("1", "2"), ("3",), ("2", "4"))]
-    _require_own_records(["a", "b"], units[:2])
+    units = (("a", ("1", "2")), ("b", ("3",)), ("c", ("2", "4")))
+    require_own_records(units[:2])
     with pytest.raises(BadInput, match="the same records in 'a' and 'c'"):
-        _require_own_records(["a", "b", "c"], units)
+        require_own_records(units)
+
+
+def test_the_python_interface_refuses_what_the_verb_does(fits):
+    for wrong, said in (((fits / "a", fits / "a"), "the same records"), ((fits / "a", fits / "b"), "rope")):
+        with pytest.raises(BadInput, match=said):
+            api.compare(*wrong, rope=0.05 if said != "rope" else 2.0)
+    for seed in ("1", -1, 1.5, None, 10**30, True):
+        with pytest.raises(BadInput, match="--seed"):
+            FitOptions(seed=seed)
+    assert FitOptions(seed=np.int64(3)).seed == 3
+    for results in ((), (fits / "a", 3)):
+        with pytest.raises(BadInput, match="results or folders"):
+            api.report(*results, out=fits / "none")
+    assert not (fits / "none").exists()
+
+
+def test_nothing_is_decided_on_forced_data(tmp_path, capsys):
+    """Whatever its intervals say; without force the same fit is accepted (planted fault: it was with force, too)."""
+    for forced in (False, True):
+        folder = write_evidence(tmp_path / str(forced), name="f", forced=forced)
+        path = limits(tmp_path, f"[loop_area_J]\nmax = {2 * AREA}\n[risk]\nconsumer = 0.05\nproducer = 0.1\n")
+        assert main(["accept", str(folder), "--limits", path, "--no-figures", "-o", str(tmp_path / "v")]) == (4 if forced else 0)
+        result = json.loads((tmp_path / "v" / "verdict.json").read_text())
+        assert all(row["verdict"] == ("inconclusive" if forced else "accepted") for row in result["limits"])
+        assert not forced or "without --force" in result["next"]["do"]
 
 
 def test_the_draws_of_a_fit_resolve_the_highest_level():

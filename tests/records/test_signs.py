@@ -55,6 +55,14 @@ def test_a_loop_passed_the_wrong_way_is_an_error():
     assert "loop_reversed" in codes("error", TORQUE[::-1].copy(), ANGLE[::-1].copy())
 
 
+def test_a_wrap_that_is_left_is_an_error():
+    """The angle comes back from its wraps at places that hide them; w(0) is then far below zero, as of no reducer (planted fault:
+    the sign of w(0) was not looked at). A wave of the encoder and noise alone do not make that."""
+    half = 0.5 * np.ptp(ANGLE)
+    assert "width_reversed" in codes("error", angle=(ANGLE - ANGLE.min()) % (1.4 * half))
+    assert "width_reversed" not in codes("error", angle=ANGLE + 0.02 * half * np.sin(9.0 * ANGLE / half))
+
+
 def test_a_channel_that_does_not_answer_is_an_error():
     noise = 1e-4 * np.random.default_rng(0).normal(size=len(TIME))
     assert "angle_not_answering" in codes("error", angle=0.1 * np.sqrt(TIME) + noise)
