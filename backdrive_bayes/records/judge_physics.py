@@ -35,7 +35,7 @@ def judge_physics(found: dict, columns: dict[str, str]):
         yield Finding(
             "error",
             "width_reversed",
-            f"at zero torque the angle is less after loading than before: w(0) = {with_error(read, sd, '′')}; no reducer does that, "
+            f"at zero torque the angle is less after loading than before: w(0) = {with_error(read, sd, '′')}; no reducer does, "
             "but an encoder that wraps or slips, or a channel that was held",
         )
     if found["energy_given"]:
