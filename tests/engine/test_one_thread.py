@@ -44,7 +44,7 @@ class Reached(Exception):
         (infer, "levels", lambda: infer.infer(SimpleNamespace(design=SimpleNamespace(scales=None)))),
         (prediction, "nodes", lambda: prediction.predict_angles(None, [], [])),
         (acceptance, "weigh", lambda: acceptance.assess([evidence()], None)),
-        (comparison, "unique_names", lambda: comparison.compare([evidence(), evidence()])),
+        (comparison, "unique_names", lambda: comparison.compare([evidence("a"), evidence("b")])),
         (averaged, "weighed_unit", lambda: averaged.fit_posterior(None)),
         (diagnose, "examine", lambda: diagnose.diagnose(None)),
         (diagnose, "diagnose", lambda: results.diagnose_unit(None, results.FitOptions())),
