@@ -271,8 +271,8 @@ def _evidence(fitted, k: float = FitOptions.k, examined: bool = False) -> Eviden
         return fitted
     if not isinstance(fitted, record.Unit) and is_result(Path(fitted)):
         return Evidence.read(Path(fitted))
-    own = fit(fitted, k=k).evidence
-    return replace(own, diagnosis=diagnose(fitted, k=k).result) if examined else own
+    found = fit(fitted, k=k).evidence
+    return replace(found, diagnosis=diagnose(fitted, k=k).result) if examined else found
 
 
 def _save(result, name, folder, figures):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import time
@@ -59,8 +58,10 @@ def run(args) -> int:
 
 def _data_sha256(out: Path) -> list[str]:
     """SHA-256 of every record in the order of units and records."""
+    from backdrive_bayes.records.unit_folder import sha256_of
+
     files = (f for f in sorted((out / UNITS).rglob("*")) if f.is_file() and f.suffix != ".toml")
-    return [hashlib.sha256(f.read_bytes()).hexdigest() for f in files]
+    return [sha256_of(f) for f in files]
 
 
 def _request(args):

@@ -41,13 +41,12 @@ def add_arguments(parser) -> None:
 def run(args) -> int:
     """Write comparison.json and figures, and what new fits give; 0 done, 4 where a unit did not converge."""
     from backdrive_bayes.decisions.claims import read_claims
-    from backdrive_bayes.decisions.comparison import compare
+    from backdrive_bayes.decisions.comparison import compare, require_rope
 
     began, options = time.perf_counter(), FitOptions.of(args)
     if len(args.units) < 2:
         raise BadInput("compare", "two units or more", "one")
-    if not 0 < args.rope < 1:
-        raise BadInput("--rope", "a share between 0 and 1", args.rope)
+    require_rope(args.rope)
     if args.out:
         require_out(args.out)
     claims = read_claims(args.claims) if args.claims else None

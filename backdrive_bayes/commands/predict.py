@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -38,6 +37,7 @@ def run(args) -> int:
     from backdrive_bayes.engine.posterior_read import read_posterior
     from backdrive_bayes.engine.prediction import nodes, predict_angles, range_caveat, rate_caveat, require_range, rest_caveat
     from backdrive_bayes.records.history import noise_free_torque, read_history
+    from backdrive_bayes.records.unit_folder import sha256_of
 
     posterior = read_posterior(args.posterior)
     if not posterior.converged:
@@ -68,7 +68,7 @@ def run(args) -> int:
         caveats = [caveat(posterior, time, torque) for caveat in (rate_caveat, rest_caveat)]
         caveats += [range_caveat(posterior, torque), FROM_REST * (args.start == "rest")]
         about = {"reason": f"{time.size} points, half-width at most {half:.3g}′", "notes": notes}
-        about["prediction_sha256"] = _digest(folder / "prediction.csv")
+        about["prediction_sha256"] = sha256_of(folder / "prediction.csv")
         result = _sidecar(args, posterior, fit[SEAL], data | about | {"caveat": "; ".join(filter(None, caveats))})
         write_json(folder / "prediction.json", result)
     say(f"{result['unit']}: {line(result['outcome'])}")
@@ -78,16 +78,13 @@ def run(args) -> int:
 
 def _sidecar(args, posterior, digest: str, about: dict) -> dict:
     """What the prediction rests on: the posterior, the torque history and the options, beside what is said ``about`` it."""
-    history = {"file": args.path.name, "sha256": _digest(args.path)}
+    from backdrive_bayes.records.unit_folder import sha256_of
+
+    history = {"file": args.path.name, "sha256": sha256_of(args.path)}
     own = {"unit": posterior.unit_name, "data_sha256": list(posterior.data_hashes)}
     result = {"schema": PREDICTION, **about, "history": history, "posterior_sha256": digest}
     options = {"start": args.start, "draws": args.draws, "extrapolate": args.extrapolate}
     return stamped(result, own, posterior.seed, options)
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _write(path, header, time, torque, at, curves) -> None:

@@ -33,6 +33,12 @@ class Matched:
     second: Loop
 
 
+def require_rope(rope: float) -> None:
+    """BadInput unless the relative difference that counts as none is one."""
+    if not 0 < rope < 1:
+        raise BadInput("--rope", "a share between 0 and 1", rope)
+
+
 def require_own_records(units) -> None:
     """BadInput where two ``units``, pairs of what they are called and the hashes of their records, have a record in common: their
     draws are not independent."""
@@ -54,8 +60,7 @@ def compare(evidences, claims: Claims | None = None, rope: float = ROPE, level: 
     evidences = list(evidences)
     if len(evidences) < 2:
         raise BadInput("compare", "two units or more", f"{len(evidences)}")
-    if not 0 < rope < 1:
-        raise BadInput("rope", "a share between 0 and 1", rope)
+    require_rope(rope)
     require_own_records((e.where or e.name, e.about["data_sha256"]) for e in evidences)
     names = unique_names(evidences)
     rng = np.random.default_rng([seed, 3])

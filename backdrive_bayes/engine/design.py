@@ -100,13 +100,13 @@ class Design:
         return Design(self.groups + groups)
 
 
-_prompt = lru_cache(maxsize=128)(of_blocks)
+_as_read = lru_cache(maxsize=128)(of_blocks)
 
 
 @lru_cache(maxsize=128)
 def _history(blocks, torque_scale_nm: float, offset: float, lag_s: float) -> History:
     """Histories of the distortions about a mode are wanted again and again; those of two offsets differ by these alone."""
-    return _prompt(blocks, torque_scale_nm, lag_s).beside(offset)
+    return _as_read(blocks, torque_scale_nm, lag_s).beside(offset)
 
 
 def histories(reduced: BlockMeans, distortion: Distortion) -> list[History]:

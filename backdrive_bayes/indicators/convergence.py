@@ -56,23 +56,26 @@ def examined(draws: IndicatorDraws, unit: Unit | None = None) -> Posterior:
 
 def contradictions(draws: IndicatorDraws, measured: tuple[MeasuredLoop | None, ...]) -> list[str]:
     """One sentence for every measured number that the posterior's interval does not hold, with both numbers."""
-    found, covariances = [], covariances_rad2(draws.posterior)
+    found = []
+    first = any(loop is not None and loop.basis == "first" for loop in measured)
+    covariances = covariances_rad2(draws.posterior) if first else []
     for record, loop in enumerate(measured):
         if loop is None:
             continue
         loops = _reached(draws, record).late(_lag_nm(draws, record))
         for name, text, unit, function in CHECKED:
-            value, sd, draws_of = getattr(loop, name), getattr(loop, f"{name}_sd"), function(loops, loop)
+            value, sd = getattr(loop, name), getattr(loop, f"{name}_sd")
             if value is None:
                 continue
+            inferred = function(loops, loop)
             if name == "loop_area_j" and loop.basis == "first":
                 left, sd = _left_by_leg(draws.posterior, record, covariances[record])
-                value = float(np.median(draws_of)) + left
-            lo, hi = np.quantile(draws_of, ends(LEVEL)[::2])
+                value = float(np.median(inferred)) + left
+            lo, hi = np.quantile(inferred, ends(LEVEL)[::2])
             room = STANDARD_ERRORS * sd + SHARE[loop.basis] * abs(value)
             if not lo - room <= value <= hi + room:
-                inferred = f"inferred as {lo:.4g} to {hi:.4g} {unit}"
-                found.append(f"{text} of {loop.record} was measured as {value:.4g} {unit}, {inferred}")
+                other = f"inferred as {lo:.4g} to {hi:.4g} {unit}"
+                found.append(f"{text} of {loop.record} was measured as {value:.4g} {unit}, {other}")
     return found
 
 
@@ -80,8 +83,7 @@ def _left_by_leg(posterior, record, covariance_rad2) -> tuple[float, float]:
     """What the longest leg of a record encloses with its mirror image beyond what the mode predicts of that leg, and its standard
     error [J]: of a first cycle only that leg is of the settled loop, whatever was before."""
     blocks = posterior.records.blocks[record]
-    ways = np.abs(np.diff(blocks.turning_nm))
-    own = blocks.leg == int(np.argmax(ways))
+    own = blocks.leg == int(np.argmax(np.abs(np.diff(blocks.turning_nm))))
     torque = blocks.torque_nm[own]
     # Its area with that image is twice the one between the curve and its chord.
     step = np.diff(torque)

@@ -47,7 +47,7 @@ def _read_folder(folder: Path) -> Unit:
         reduction_ratio=entry.reduction_ratio,
         identity=entry.identity,
         notes=entry.notes,
-        file_sha256=_sha256(folder / FILE_NAME),
+        file_sha256=sha256_of(folder / FILE_NAME),
     )
 
 
@@ -70,11 +70,12 @@ def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
     angle, wraps = unwrapped(torque, angle)
     declared = (entry.loading_rate_nm_per_s, entry.amplitude_nm)
     notes = (*channels.notes, *clock, *wraps)
-    record = Record(entry.name, time, torque, angle, *declared, notes, channels.spelling, _sha256(entry.path))
+    record = Record(entry.name, time, torque, angle, *declared, notes, channels.spelling, sha256_of(entry.path))
     check_plausible(record, rated_torque_nm, str(entry.path))
     return record
 
 
-def _sha256(path: Path) -> str:
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's bytes, as hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

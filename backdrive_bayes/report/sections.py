@@ -51,9 +51,10 @@ def chapters(folder: Path) -> list[Chapter]:
         raise BadInput(folder, "a result folder", "no such folder")
     _require_one_unit(folder)
     there = [name for name in SECTIONS if (folder / name).exists()]
-    # What a check found is told with the fit that rests on it.
-    told = {"check.json"} if "indicators.json" in there else set()
-    found = [_chapter(SECTIONS[name], folder / name) for name in there if name not in told]
+    # What a check found stands in the chapter of the fit that rests on it.
+    if "indicators.json" in there:
+        there = [name for name in there if name != "check.json"]
+    found = [_chapter(SECTIONS[name], folder / name) for name in there]
     if not found:
         raise BadInput(folder, f"a result folder with {' or '.join(SECTIONS)}", "none of them")
     return found

@@ -11,7 +11,7 @@ from backdrive_bayes.mechanics.clearance import place_knots, spaced
 from backdrive_bayes.mechanics.friction import FRICTION, THRESHOLDS, flank, plays, principal_components
 from backdrive_bayes.mechanics.history import through
 from backdrive_bayes.mechanics.part import TOP
-from backdrive_bayes.mechanics.reducer import BASELINE, ReducerClass
+from backdrive_bayes.mechanics.reducer import BASELINE, GROWTH_STEPS, ReducerClass
 
 KNOTS = np.r_[0.0, np.geomspace(0.01, TOP, 20)]
 REDUCER = ReducerClass(KNOTS)
@@ -165,7 +165,7 @@ def test_growths_of_draws_are_those_of_the_thresholds(part, spread, moves):
         return sum(columns[n] @ weights[n] for n in columns)
 
     exact = np.stack([angle(shift) for shift in shifts]) - angle(0.0)
-    derivative = (angle(1e-3) - angle(0.0)) / 1e-3
+    derivative = (angle(GROWTH_STEPS[part]) - angle(0.0)) / GROWTH_STEPS[part]
     found = REDUCER.shifted(history, weights, growth, part, shifts, term)
     assert np.abs(found - exact).max() < 0.3 * np.abs(np.outer(shifts, derivative) - exact).max()
     many = spread * rng.standard_normal(400)
