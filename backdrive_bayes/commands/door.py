@@ -45,11 +45,17 @@ class ReadyUnit:
 def judged(unit, k: float = 0.03, force: bool = False, where: object = "") -> ReadyUnit:
     """Check a unit; ``k`` is the share of T_r at which lost motion is taken.
 
-    Raises BadInput, which names ``where``, for a unit in which the check finds errors, unless ``force``.
+    Raises BadInput for a unit in which the check finds errors, unless ``force``; it names ``where`` the unit was read from,
+    which is empty for one that was made in memory.
     """
     from backdrive_bayes.records.check import check_unit
     from backdrive_bayes.records.faults import without_wild
+    from backdrive_bayes.records.plausible import check_plausible, refuse_short
 
+    if not where:  # made in memory: what a reader would refuse
+        for record in unit.records:
+            refuse_short(record.time_s.size, record.name)
+            check_plausible(record, unit.rated_torque_nm, record.name)
     checked = check_unit(unit, k)
     if not checked["may_infer"] and not force:
         expected = "data fit for inference (--force, in Python force=True, goes on regardless)"
@@ -67,11 +73,11 @@ def ready_unit(path: Path, k: float = 0.03, force: bool = False) -> ReadyUnit:
 
 
 def repeat_findings(name: str, result: dict) -> None:
-    """Say the errors and warnings that a result object of a unit carries, and whether it was forced."""
+    """Say what a result object of a unit carries: whether it was forced, errors, warnings, and notes on the unit itself."""
     if result.get("forced"):
         say(f"{name}: {FORCED}")
     for finding in result.get("findings", []):
-        if finding["level"] != "note":
+        if finding["level"] != "note" or not finding["record"]:
             where = f"{finding['record']}: " if finding["record"] else ""
             say(f"{finding['level']}: {where}{finding['text']}")
 

@@ -78,6 +78,7 @@ class Expression:
         used = _check(body, frozenset(letters))
         return cls(text.strip(), body, frozenset(used))
 
+    @np.errstate(divide="ignore", invalid="ignore")  # what is not defined in a draw is said in words
     def run(self, look_up, along=None):
         """The value; ``look_up(letter, method, arguments, keywords)`` gives a unit's quantity, ``along`` is the coordinate."""
         return _run(self.body, look_up, along)
@@ -100,6 +101,7 @@ class Expression:
                 found.setdefault(ast.unparse(n), (ast.unparse(n), n, _unit(n)))
         return list(found.values())
 
+    @np.errstate(divide="ignore", invalid="ignore")
     def run_part(self, node, look_up, along=None):
         """The value of one of :meth:`parts`."""
         return _run(node, look_up, along)
@@ -179,9 +181,8 @@ def _run(node, look_up, along):
         value = _run(node.operand, look_up, along)
         return np.logical_not(value) if isinstance(node.op, ast.Not) else -value if isinstance(node.op, ast.USub) else value
     if isinstance(node, ast.BinOp):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            left, right = (np.asarray(_run(n, look_up, along)) for n in (node.left, node.right))
-            return np.asarray(_OPERATORS[type(node.op)](left, right))
+        left, right = (np.asarray(_run(n, look_up, along)) for n in (node.left, node.right))
+        return np.asarray(_OPERATORS[type(node.op)](left, right))
     sides = [_run(n, look_up, along) for n in (node.left, *node.comparators)]
     held = [_OPERATORS[type(op)](a, b) for op, a, b in zip(node.ops, sides[:-1], sides[1:], strict=True)]
     return np.logical_and.reduce(np.broadcast_arrays(*held))

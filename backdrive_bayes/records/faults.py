@@ -21,6 +21,7 @@ _DRAG_SHARE = 0.3  # of the largest torque: drag at which clearances are crossed
 _DRAG_STEPS = 2.0  # of the usual ones: a torque that goes on so closely has missed nothing
 _HELD_SHARE, _HELD_SAMPLES, _HELD_CHANCE = 0.03, 10, 1e-6
 # The same, more than a turning point's; samples below which no channel is said to be held; expected runs of the noise alone
+_HELD_LONG = 0.1  # of the record's samples: a channel that is not read for so long says nothing of a leg's best part
 
 
 def gaps_after(time_s: np.ndarray) -> np.ndarray:
@@ -98,7 +99,8 @@ def find_plateaus(time_s: np.ndarray, torque_nm: np.ndarray, low: float, high: f
 
 
 def longest_frozen(values: np.ndarray, other: np.ndarray) -> dict:
-    """Longest run of exactly equal values, the share of the other channel's range passed meanwhile, and the run's ``chance``.
+    """Longest run of exactly equal values, its share of the record, that of the other channel's range passed meanwhile, and the
+    run's ``chance``.
 
     ``chance`` bounds the expected number of runs so long in a record of a channel that stands still and has this one's noise:
     samples · P(noise stays within one quantum)^(length - 1). It is 1 or more where a quantum hides the noise.
@@ -135,18 +137,28 @@ def _longest(values, other, edges, lengths) -> dict:
     moved = float(np.ptp(means))
     span = float(np.ptp(other))
     chance = len(values) * _share_in_one_quantum(values) ** (stop - start - 1)
-    return {"start": start, "samples": stop - start, "other_share": moved / span if span > 0.0 else 0.0, "chance": chance}
+    return {
+        "start": start,
+        "samples": stop - start,
+        "record_share": (stop - start) / len(values),
+        "other_share": moved / span if span > 0.0 else 0.0,
+        "chance": chance,
+    }
 
 
 def stands_still(frozen: dict) -> bool:
-    """Whether a run of equal values, as from ``longest_frozen``, is a frozen channel and no quantised one."""
-    return frozen["samples"] >= 20 and frozen["other_share"] > _FROZEN_SHARE
+    """Whether a run of equal values, as from ``longest_frozen``, is a frozen channel and no quantised one.
+
+    Over a turning point the other channel comes back and passes little; there the noise tells.
+    """
+    far = frozen["other_share"] > _FROZEN_SHARE or (held(frozen) and frozen["record_share"] > _HELD_LONG)
+    return frozen["samples"] >= 20 and far
 
 
 def held(frozen: dict) -> bool:
-    """Whether noise makes a run of equal values impossible that is too short to count as standing still."""
+    """Whether noise makes a run of equal values impossible: the channel was not read."""
     long = frozen["samples"] >= _HELD_SAMPLES and frozen["other_share"] > _HELD_SHARE
-    return long and frozen["chance"] < _HELD_CHANCE and not stands_still(frozen)
+    return long and frozen["chance"] < _HELD_CHANCE
 
 
 def _share_in_one_quantum(values: np.ndarray) -> float:

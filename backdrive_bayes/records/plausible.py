@@ -10,6 +10,8 @@ from backdrive_bayes.records.record import Record
 from backdrive_bayes.records.turning import block_means
 from backdrive_bayes.records.white_noise import white_noise
 
+FEWEST_READ = 24
+"""Samples below which no ramp, branch or noise can be told at all."""
 _FULL_CYCLE = 1.8  # torque travelled over its peak-to-peak value: 2 in a full cycle, 1.5 in three quarters of one
 _LEAST_SIDE = 0.2  # the smaller of the two peaks against the larger
 _STRAIGHT = 0.02  # misfit of a commanded ramp against straight flanks, as a share of peak-to-peak
@@ -18,6 +20,12 @@ _SMALLEST = 1e-30  # N·m, rad
 _SHORTEST_S, _LONGEST_S = 1e-6, 1e9
 _POINTS = 40_000  # enough to count hundreds of cycles
 _SHAPE_POINTS = 4000
+
+
+def refuse_short(samples: int, where: str) -> None:
+    """Raise BadInput at ``where`` for a record of too few samples."""
+    if samples < FEWEST_READ:
+        raise BadInput(where, f"a record of {FEWEST_READ} samples or more", f"{samples} sample{'s'[: samples != 1]}")
 
 
 def check_plausible(record: Record, rated_torque_nm: float | None, where: str) -> None:

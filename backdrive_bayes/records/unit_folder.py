@@ -11,14 +11,11 @@ from backdrive_bayes.errors import BadInput
 from backdrive_bayes.records.clock import strictly_rising
 from backdrive_bayes.records.columns import DEFAULT_COLUMNS, read_channels
 from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild
-from backdrive_bayes.records.plausible import check_plausible
+from backdrive_bayes.records.plausible import check_plausible, refuse_short
 from backdrive_bayes.records.readers import READERS, record_suffix
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.unit_toml import FILE_NAME, RecordEntry, read_unit_toml
 from backdrive_bayes.records.wraps import unwrapped
-
-FEWEST_READ = 24
-"""Samples below which no ramp, branch or noise can be told at all."""
 
 
 def read_unit(path: Path | str) -> Unit:
@@ -64,8 +61,7 @@ def _read_bare(path: Path) -> Unit:
 def _read_record(entry: RecordEntry, rated_torque_nm: float | None) -> Record:
     channels = read_channels(entry.path, DEFAULT_COLUMNS, entry.columns)
     time, torque, angle = channels.values.values()
-    if time.size < FEWEST_READ:
-        raise BadInput(entry.path, f"a record of {FEWEST_READ} samples or more", f"{time.size} sample{'s'[: time.size != 1]}")
+    refuse_short(time.size, str(entry.path))
     time, clock = strictly_rising(time, channels.first_row, str(entry.path))
     angle, wraps = unwrapped(torque, angle)
     declared = (entry.loading_rate_nm_per_s, entry.amplitude_nm)

@@ -36,6 +36,14 @@ def test_few_isolated_samples_are_said_once_and_left_out():
     assert record.notes == ("10 isolated samples far from the neighbours left out",)
 
 
+def test_a_unit_made_in_memory_is_refused_where_a_reader_would_refuse_it():
+    time, torque = ramps(noise=0.002)
+    with pytest.raises(BadInput, match="24 samples or more"):
+        judged(Unit("u", 1.0, (Record("r.csv", time[:20], torque[:20], answer(torque[:20])),)))
+    with pytest.raises(BadInput, match="angle that answers the torque"):
+        judged(Unit("u", 1.0, (Record("r.csv", time, torque, np.full(time.size, 0.1)),)), force=True)
+
+
 def test_what_is_overruled_of_a_simulator_is_said_of_the_result():
     """The gap to a simulator of unfit data was told as if nothing had been overruled."""
     ready = judged(dropped(0.01))

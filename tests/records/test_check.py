@@ -134,6 +134,21 @@ def test_frozen_channel_speaks_against_inference():
     assert not result["may_infer"] and "stands still" in result["reason"]
 
 
+@pytest.mark.parametrize("channel", ["torque_nm", "angle_rad"])
+def test_a_channel_held_over_a_tip_for_a_fifth_of_the_record_is_an_error(channel):
+    """It passed for an encoder at rest: there and back the other channel comes to the same value."""
+    time, torque = ramps(noise=0.002)
+    noisy = answer(torque) + 0.3 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
+    channels = {"torque_nm": torque, "angle_rad": noisy}
+    assert judged(time, torque, noisy, noise=0.0)[0]["may_infer"]
+    tip = int(np.argmax(torque))
+    about = slice(tip - len(time) // 10, tip + len(time) // 10)
+    channels[channel] = channels[channel].copy()
+    channels[channel][about] = channels[channel][about.start]
+    result, _ = judged(time, channels["torque_nm"], channels["angle_rad"], noise=0.0)
+    assert "stands still" in texts(result, "error") and not result["may_infer"]
+
+
 def test_a_frozen_channel_that_catches_up_is_not_taken_for_a_wrapping_encoder():
     time, torque = ramps(noise=0.002)
     angle = answer(torque) + 0.1 * ARCMIN * np.random.default_rng(0).normal(size=len(torque))
