@@ -21,9 +21,9 @@ class Record:
 
     ``time_s``, ``torque_nm`` and ``angle_rad`` have shape (samples,) and hold finite float64 values in SI units;
     time rises strictly (BadInput else). ``loading_rate_nm_per_s`` and ``amplitude_nm`` are what the unit file declares (None
-    where it is silent). ``notes`` says in words what the reader did to the data (re-timing, dropped rows and so on). ``columns`` maps
-    'time', 'torque' and 'angle' to the spelling under which the unit file finds them, a leading minus where a sign is turned.
-    ``file_sha256`` is that of the file's bytes, empty for a record that was made in memory.
+    where it is silent). ``notes`` says in words what the reader did to the data (re-timing, dropped rows and so on).
+    ``columns`` maps 'time', 'torque' and 'angle' to the spelling under which the unit file finds them, a leading minus where a
+    sign is turned. ``file_sha256`` is that of the file's bytes, empty for a record that was made in memory.
     """
 
     name: str
