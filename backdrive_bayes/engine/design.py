@@ -225,8 +225,8 @@ def _columns(name: str, of) -> Group:
 
 def _smoothing(reduced, reducer, distortion, weights, base, delayed):
     """Prediction behind a first-order lag less that behind a pure delay of the same mean, and its derivative by the mean, one
-    array (blocks,) a record each; nothing for a lag below the noise. ``delayed`` is the derivative of the latter."""
-    if distortion.lag_s * reduced.context.rate.max() < 0.5 * reduced.context.torque_noise:
+    array (blocks,) a record each; nothing for a lag below the noise or the step. ``delayed`` is the derivative of the latter."""
+    if distortion.lag_s < max(STEP, 0.5 * reduced.context.torque_noise / reduced.context.rate.max()):
         return [np.zeros(b.size) for b in base], [np.zeros(b.size) for b in base]
     found, growth = [], []
     prompt = grown_histories(reduced, replace(distortion, lag_s=0.0))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.planted import MORE, SCALE, UNITS, by_hand, joint_mode, planted, smooth_reducer
+from support.planted import MORE, NOISE, SCALE, UNITS, by_hand, joint_mode, planted, smooth_reducer
 
 from backdrive_bayes.engine import knots as knots_module
 from backdrive_bayes.engine import linearise as engine
@@ -113,6 +113,16 @@ def test_a_lag_that_smooths_is_found():
     share = np.random.default_rng(0).uniform(size=200_000)
     assert np.exp(on[0]) == pytest.approx(np.sqrt(np.mean(share**2)), rel=3e-3) and on[1] == 0.0
     assert without[1] == 0.0 and np.exp(without[0]) < 0.2 and off == OFF
+
+
+@pytest.mark.parametrize("lag_s", [8e-6, 9.5e-6])
+def test_a_lag_shorter_than_half_the_step_of_its_derivative_changes_nothing(lag_s):
+    """Fast clocks and a fine torque resolve microseconds; a quotient to either side of them took a lag that runs backwards."""
+    reduced = reduce_unit(planted(noise=replace(NOISE, torque_nm=1e-7)), COARSE)
+    alone = search.Search(reduced, library_terms(), BASELINE, only=("sensor_lag",))
+    prompt, late = (alone.first(Distortion(lag_s=lag)) for lag in (0.0, lag_s))
+    assert all(np.isfinite(column).all() for group in late.design.groups for column in group.columns)
+    assert late.log_marginal == pytest.approx(prompt.log_marginal, abs=1.0)
 
 
 def test_one_start_holds_the_lag():
