@@ -15,6 +15,7 @@ from backdrive_bayes.records.faults import (
     gaps_after,
     longest_frozen,
     quantum,
+    unread_torque,
     with_wild_bridged,
 )
 from backdrive_bayes.records.findings import Finding, errors_of, warnings_of
@@ -25,7 +26,7 @@ from backdrive_bayes.records.messages import judge_record
 from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
 from backdrive_bayes.records.plausible import why_unfinished
 from backdrive_bayes.records.record import Record, Unit
-from backdrive_bayes.records.shape import closure, cycle_count, extremes, ramp_rate
+from backdrive_bayes.records.shape import closure, cycle_count, extremes, mean_rate
 from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy, width_reversed
 from backdrive_bayes.results import CHECK
 
@@ -85,14 +86,15 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
         "gaps": find_gaps(time, torque),
         "gap_count": int(gaps_after(time).size),
         **channels,
+        "unread_torque": unread_torque(torque, angle),
         "plateaus": find_plateaus(time, torque, low, high),
         "angle_range_rad": float(np.ptp(angle)),
-        "angle_signal_rad": _signal(angle),
+        "angle_signal_rad": max(_signal(angle), abs(rise["rise_rad"])),  # many cycles are alike in all blocks
         "branches": [_branch(branch, torque) for branch in branches],
         "cycles": int(cycle_count(time, torque, segments) + 0.05),
         "torque_range_Nm": [low, high],
         "amplitude_Nm": {"estimated": 0.5 * (high - low), "declared": record.amplitude_nm},
-        "loading_rate_Nm_per_s": {"estimated": ramp_rate(time, torque, segments), "declared": record.loading_rate_nm_per_s},
+        "loading_rate_Nm_per_s": {"estimated": mean_rate(time, torque, segments), "declared": record.loading_rate_nm_per_s},
         "closure": closure(time, torque, angle, branches, noise),
         "noise": _si_names(asdict(noise)),
         "angle_rise": rise,

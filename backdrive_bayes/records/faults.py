@@ -14,9 +14,11 @@ SPOILING_SHARE = 0.1
 """Of a channel's range: an isolated sample further off than that is left out before inference."""
 _GAP_STEPS = 5.0
 _WILD_SD = 12.0
+_TIP_STEPS = 2.0  # usual steps by which no tip of a ramp stands out of its neighbours: 1.5 of the median of five
 _PLATEAU_TIMES = 5.0  # a triangle spends 5 % of its time in the top 5 %, a sine 20 %; so many times a triangle's is neither
 _MOST_LISTED = 20
 _FROZEN_SHARE = 0.3  # of the other channel's range passed while one stood exactly still
+_STILL_SHARE, _MEANS = 0.02, 200  # of the torque's range, within which it stays the same; parts of a record it is judged by
 _DRAG_SHARE = 0.3  # of the largest torque: drag at which clearances are crossed
 _DRAG_STEPS = 2.0  # of the usual ones: a torque that goes on so closely has missed nothing
 _HELD_SHARE, _HELD_SAMPLES, _HELD_CHANCE = 0.03, 10, 1e-6
@@ -57,7 +59,7 @@ def find_wild(values: np.ndarray, least_share: float = 0.02) -> np.ndarray:
     off[[0, -1]] = np.maximum(steps[[0, -1]] - np.maximum(steps[[1, -2]], steps[[2, -3]]), 0.0)
     usual = 1.4826 * float(np.median(off[off > 0.0])) if np.any(off > 0.0) else 0.0
     # The range is that of the medians: one spike would hide others.
-    return off > max(_WILD_SD * usual, least_share * float(np.ptp(median)))
+    return off > max(_WILD_SD * usual, least_share * float(np.ptp(median)), _TIP_STEPS * float(np.median(steps)))
 
 
 def without_wild(unit: Unit) -> Unit:
@@ -124,6 +126,24 @@ def frozen_torque(torque_nm: np.ndarray, angle_rad: np.ndarray) -> dict:
     return _longest(torque_nm, angle_rad, edges, np.where(crossing, 0, lengths))
 
 
+def unread_torque(torque_nm: np.ndarray, angle_rad: np.ndarray) -> dict | None:
+    """Where the torque stays the same, noise aside, while the angle goes far there and back: no reducer does, its torque is not
+    read. None where there is no such place; a clearance is crossed at one torque, too, but in one direction."""
+    edges = np.linspace(0, len(torque_nm), min(_MEANS, len(torque_nm)) + 1).astype(int)
+    torque, angle = (np.add.reduceat(values, edges[:-1]) / np.diff(edges) for values in (torque_nm, angle_rad))
+    still, far = _STILL_SHARE * float(np.ptp(torque)), _FROZEN_SHARE * float(np.ptp(angle))
+    stop = 0
+    for start in range(len(torque)):
+        while stop < len(torque) and np.ptp(torque[start : stop + 1]) <= still:
+            stop += 1
+        part = angle[start:stop]
+        turns = np.sort([np.argmin(part), np.argmax(part)])
+        legs = np.abs(np.diff(part[[0, *turns, -1]]))
+        if np.count_nonzero(legs > far) > 1:
+            return {"start": int(edges[start]), "samples": int(edges[stop] - edges[start]), "torque_Nm": float(torque[start])}
+    return None
+
+
 def _edges_of_runs(values: np.ndarray) -> np.ndarray:
     """Where runs of equal values begin, and the end of the last."""
     return np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]))
@@ -163,15 +183,20 @@ def held(frozen: dict) -> bool:
 
 def _share_in_one_quantum(values: np.ndarray) -> float:
     """Probability that the channel's noise, at best centred, stays within the channel's own step, 1 without noise."""
-    steps, second = np.diff(np.unique(values)), np.diff(values, 2)
-    steps = steps[steps > 1e-9 * float(np.ptp(values))]  # less are roundings of one level
-    if not steps.size or not second.size:
+    step, second = least_step(values), np.diff(values, 2)
+    if not step or not second.size:
         return 1.0
-    step = float(np.median(steps))
     variance = min(float(np.mean(second**2)), (1.4826 * float(np.median(np.abs(second)))) ** 2) / 6.0
     # A staircase without noise has second differences of at most one step in root mean square.
     variance -= step**2 / 6.0
     return math.erf(step / math.sqrt(8.0 * variance)) if variance > 0.0 else 1.0
+
+
+def least_step(values: np.ndarray) -> float:
+    """By how much the levels of a channel differ that lie next to each other, in the median; zero where there is but one."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > 1e-9 * float(np.ptp(values))]  # less are roundings of one level
+    return float(np.median(steps)) if steps.size else 0.0
 
 
 def quantum(values: np.ndarray) -> float | None:

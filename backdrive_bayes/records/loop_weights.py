@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.records.record import Record
-from backdrive_bayes.records.shape import turning_levels
+from backdrive_bayes.records.shape import starting_level, turning_levels
 
 _FULL = 0.9  # of the longest ramp: shorter ones are minor loops or the first loading
 _CLOSED = 0.02  # of a ramp, between the first and the last torque of a cycle: a ramp that the record cuts short closes none
@@ -40,7 +40,7 @@ def cycles_of(record: Record, segments) -> Cycles | None:
     if len(segments) < 2:
         return None
     ends = np.abs(record.torque_nm[[0, -1]])
-    start = float(np.median(record.torque_nm[: max(3, segments[0].stop // 100)]))
+    start = starting_level(record.time_s, record.torque_nm, segments)
     levels = np.r_[start, turning_levels(record.time_s, record.torque_nm, (*segments, segments[-1]))]
     ramps = np.abs(np.diff(levels))
     full, amplitude = ramps >= _FULL * ramps.max(), 0.5 * float(ramps.max())

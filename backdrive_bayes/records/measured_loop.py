@@ -12,10 +12,13 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from backdrive_bayes.records.branches import find_segments
-from backdrive_bayes.records.faults import gaps_after
+from backdrive_bayes.records.faults import gaps_after, quantum
 from backdrive_bayes.records.loop_weights import RAMP_SHARE, area_weights, cycles_of, first_cycle, settled_cycle, zero_torque_nm
 from backdrive_bayes.records.noise import ChannelRecord, NoiseEstimate, estimate_common_noise
 from backdrive_bayes.records.record import Record, Unit
+
+_DITHER = 0.4
+"""White noise, in steps of the encoder, from which a mean of many angles errs by a seventieth of a step at most."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,8 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
     # The chord stands for the slope at the tip, which may be half as much again, or half of it.
     closing = 0.5 * float(mean["closing"] @ record.angle_rad)
     errors = [_angle_error(record, area, noise), _torque_error(record, found, noise), _gap_error(record, found), closing]
-    width, width_sd = _width(record, found, mean.get("widths"), noise)
+    step = _step_error(record, noise)
+    width, width_sd = _width(record, found, mean.get("widths"), noise, step)
     return MeasuredLoop(
         record=record.name,
         basis="settled" if found.settled else "first",
@@ -73,7 +77,7 @@ def measure_loop(record: Record, segments, noise: NoiseEstimate) -> MeasuredLoop
         loop_area_j=float(area @ record.angle_rad),
         loop_area_j_sd=float(np.linalg.norm(errors)),
         half_peak_to_peak_rad=float(height @ record.angle_rad),
-        half_peak_to_peak_rad_sd=float(np.hypot(_angle_error(record, height, noise), _corner_error(found))),
+        half_peak_to_peak_rad_sd=float(np.linalg.norm([_angle_error(record, height, noise), _corner_error(found), step])),
         zero_torque_width_rad=width,
         zero_torque_width_rad_sd=width_sd,
         zero_nm=0.0 if width is None else float(np.mean([zero_torque_nm(record, segments[k + 1]) for k in found.starts])),
@@ -92,7 +96,7 @@ def _mean(parts) -> dict[str, np.ndarray]:
     return {name: values / count[name] for name, values in total.items()}
 
 
-def _width(record: Record, found, weights, noise) -> tuple[float | None, float | None]:
+def _width(record: Record, found, weights, noise, step) -> tuple[float | None, float | None]:
     """Mean width at zero torque and its standard error; what a window twice as long changes is an error of its own, and so is
     what a straight torque over half the time changes."""
     if weights is None:
@@ -100,7 +104,7 @@ def _width(record: Record, found, weights, noise) -> tuple[float | None, float |
     short, long, closely = weights @ record.angle_rad
     ramp = RAMP_SHARE * (found.bounds[0][1] - found.bounds[0][0])
     torque = noise.torque_nm * found.slope_rad_per_nm * np.sqrt(2.0 / (ramp * len(found.starts)))
-    errors = [_angle_error(record, weights[0], noise), torque, long - short, closely - short]
+    errors = [_angle_error(record, weights[0], noise), torque, long - short, closely - short, np.sqrt(2.0) * step]
     return float(short), float(np.linalg.norm(errors))
 
 
@@ -113,6 +117,12 @@ def _angle_error(record: Record, weights: np.ndarray, noise: NoiseEstimate) -> f
     steps = np.array([np.ones(weights.size), np.full(weights.size, -decay)])
     correlated = float(weights @ (2.0 * solve_banded((1, 0), steps, weights) - weights))
     return float(np.sqrt(max(white + noise.correlated_rad**2 * correlated, 0.0)))
+
+
+def _step_error(record: Record, noise: NoiseEstimate) -> float:
+    """Standard deviation of an angle that is read in steps [rad]; noise of a good part of a step makes means finer than steps."""
+    step = quantum(record.angle_rad) or 0.0
+    return step / np.sqrt(12.0) if noise.white_rad < _DITHER * step else 0.0
 
 
 def _corner_error(found) -> float:

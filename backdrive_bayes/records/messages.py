@@ -50,6 +50,10 @@ def _channels(found, _):
             yield Finding("error", "coarse" if coarse else "frozen", coarse or text)
         elif held(frozen):
             yield Finding("warning", "held", f"{text}: its noise forbids that; it is held, not read, or clipped")
+    if found["unread_torque"]:
+        place = "from sample {} for {} samples".format(found["unread_torque"]["start"] + 1, found["unread_torque"]["samples"])
+        text = f"torque stays near {found['unread_torque']['torque_Nm']:.4g} N·m {place} while angle goes far there and back"
+        yield Finding("error", "unread_torque", f"{text}: it is not read, though its noise may go on")
     if (found["angle_quantum_rad"] or 0.0) > found["noise"]["white_rad"]:
         yield Finding("note", "quantised", f"angle comes in steps of {_arcmin(found['angle_quantum_rad']):.3g}′")
 
@@ -104,7 +108,8 @@ def _closure(found, _):
     place = f"{closure['torque_Nm']:.3g} N·m ({closure['basis']})"
     text = f"{with_error(_arcmin(difference), _arcmin(sd), '′')} at {place}"
     if abs(difference) > max(3.0 * sd, 0.02 * found["angle_range_rad"]):
-        yield Finding("warning", "not_closed", f"the loop does not close: {text}; angle drifts, creeps or ratchets")
+        why = "angle drifts, creeps or ratchets, or its encoder slips"
+        yield Finding("warning", "not_closed", f"the loop does not close: {text}; {why}")
     else:
         yield Finding("note", "closure", f"the loop closes to {text}")
 

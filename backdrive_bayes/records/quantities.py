@@ -37,6 +37,7 @@ _NAMES = {
     "angle": "angle winkel drehwinkel verdrehwinkel abtriebswinkel verdrehung phi φ ϕ theta θ rotation encoder position "
     "angolo angulo ángulo hoek angle_de_rotation output_angle angle_out twist 角度 转角 回転角",
 }
+_MEANT = {"grad": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad"}
 _KNOWN = {kind: frozenset(words.split()) for kind, words in _NAMES.items()}
 
 
@@ -101,6 +102,8 @@ def canonical(unit: str) -> str:
 def suggestion(unit: str, kind: str) -> str:
     """A question whether a near unit was meant, empty where none is near."""
     near = [known for known in UNITS[kind] if known.casefold() == unit.casefold()]
+    meant = _MEANT.get(unit.casefold())
+    near = near or [meant for known in UNITS[kind] if known == meant]
     near = near or difflib.get_close_matches(unit, UNITS[kind], n=1)
     return f" (did you mean {near[0]}?)" if unit and near else ""
 

@@ -7,31 +7,41 @@ from dataclasses import dataclass
 import numpy as np
 
 from backdrive_bayes.records.branches import Branch, Segment
+from backdrive_bayes.records.reduction import SAME_TIP, loading_rate
 from backdrive_bayes.records.turning import LINE_POINTS, block_means
 
-_FULL = 0.8  # reversals of at least this share of the largest count for the amplitude
 _TIP = 0.05  # share of the amplitude next to a tip on which its angle is read
+_MEANS = 40  # of a leg's torque, through which its path is drawn
 _RESTS = 40  # beginnings of a rest that are tried: apart by less than half a percent of the torque of a leg
 
 
 def turning_levels(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> np.ndarray:
     """Torque in N·m at the turning points, extrapolated along the segments so that noise adds no bias."""
-    levels = []
-    for segment in segments[:-1]:
-        count = segment.stop - segment.start
-        part = slice(segment.stop - max(count // 10, min(3, count)), segment.stop)
-        levels.append(_reached(time_s[part], torque_nm[part]))
-    return np.array(levels)
+    last = ((segment.stop - _near_end(segment), segment.stop) for segment in segments[:-1])
+    return np.array([_reached(time_s[start:stop], torque_nm[start:stop]) for start, stop in last])
 
 
-def _reached(time_s: np.ndarray, torque_nm: np.ndarray) -> float:
-    """Torque in N·m that a leg reaches, from its last part: a straight ramp up to its end, or one that then comes to rest.
+def starting_level(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
+    """Torque in N·m at which the record begins, extrapolated likewise: where it begins at a tip, that is a turning point."""
+    part = slice(0, _near_end(segments[0]))
+    return _reached(-time_s[part][::-1], torque_nm[part][::-1], beyond=0.0)
+
+
+def _near_end(segment: Segment) -> int:
+    """Samples of a leg from which the torque at its end is read."""
+    count = segment.stop - segment.start
+    return max(count // 10, min(3, count))
+
+
+def _reached(time_s: np.ndarray, torque_nm: np.ndarray, beyond: float = 0.5) -> float:
+    """Torque in N·m that a leg reaches, from its last part: a straight ramp up to its end, ``beyond`` steps after the last sample, or
+    one that then comes to rest.
 
     A rest is believed where the squares left fall by more than two parameters are worth (Schwarz's criterion).
     """
     if len(time_s) < 3:
         return float(torque_nm.mean())
-    stop = time_s[-1] + 0.5 * float(np.median(np.diff(time_s)))
+    stop = time_s[-1] + beyond * float(np.median(np.diff(time_s)))
     block = max(1, len(time_s) // LINE_POINTS)
     time, torque = (block_means(values[len(values) % block :], block) for values in (time_s, torque_nm))
     count = len(time)
@@ -49,7 +59,7 @@ def _reached(time_s: np.ndarray, torque_nm: np.ndarray) -> float:
 
 
 def extremes(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> tuple[float, float]:
-    """Lowest and highest torque in N·m between which the full cycles run.
+    """Lowest and highest torque in N·m between which the largest cycles run.
 
     The record's ends are no tips: they count where they lie further out than all of these.
     """
@@ -57,9 +67,21 @@ def extremes(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment,
     levels = np.r_[levels, [e for e in (start, end) if not levels.size or not levels.min() <= e <= levels.max()]]
     high, low = levels.max(), levels.min()
     return (
-        float(np.median(levels[levels <= low + (1 - _FULL) * abs(low)])),
-        float(np.median(levels[levels >= high - (1 - _FULL) * abs(high)])),
+        float(np.median(levels[levels <= low + SAME_TIP * abs(low)])),
+        float(np.median(levels[levels >= high - SAME_TIP * abs(high)])),
     )
+
+
+def mean_rate(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
+    """Loading rate of a record in N·m/s as ``loading_rate`` defines it, of the path through means of each leg's samples."""
+    knots = []
+    for segment, level in zip(segments, [*turning_levels(time_s, torque_nm, segments), None], strict=True):
+        edges = np.unique(np.linspace(segment.start, segment.stop, _MEANS + 1).astype(int))
+        means = (np.add.reduceat(v[: segment.stop], edges[:-1]) / np.diff(edges) for v in (time_s, torque_nm))
+        knots.append(tuple(means))
+        if level is not None:
+            knots.append((time_s[segment.stop - 1 : segment.stop], np.array([level])))
+    return loading_rate(*(np.concatenate(channel) for channel in zip(*knots, strict=True)))
 
 
 def ramp_rate(time_s: np.ndarray, torque_nm: np.ndarray, segments: tuple[Segment, ...]) -> float:
@@ -93,25 +115,28 @@ def _ends(torque: np.ndarray) -> tuple[float, float]:
 
 
 def closure(time_s, torque_nm, angle_rad, branches: tuple[Branch, ...], noise) -> dict | None:
-    """Angle at the end of the last full cycle minus that a cycle earlier, both at the same torque.
+    """Angle at the end of a full cycle minus that a cycle earlier, both at the same torque: of the cycle that closes worst.
 
-    The tip is approached on the same branch both times and the angle is read from a line over its last part.
-    ``basis`` says whether the earlier approach was already in the settled loop or still the first loading.
-    None where no cycle comes back to its tip.
+    The tip is approached on the same branch both times and the angle is read from a line over its last part. Where there are
+    later ones, cycles that begin at the first loading's tip do not count; ``basis`` says so. None where no cycle comes back to
+    its tip.
     """
     tips = _tips(time_s, torque_nm, angle_rad, branches)
-    pair = next(((a, b) for b in reversed(tips) for a in tips if b.key == (a.label, a.cycle + 1)), None)
-    if pair is None:
+    pairs = [(a, b) for b in reversed(tips) for a in tips if b.key == (a.label, a.cycle + 1)]
+    settled = [pair for pair in pairs if pair[0] is not tips[0]]
+    if not pairs:
         return None
-    before, after = pair
-    torque = min((tip.torque_nm for tip in pair), key=abs)
-    first = f"{before.label} of the first loading and of the loop"
+    return max((_closed(*pair, bool(settled), noise) for pair in settled or pairs), key=lambda one: abs(one["difference_rad"]))
+
+
+def _closed(before: _Tip, after: _Tip, settled: bool, noise) -> dict:
+    torque = min(before.torque_nm, after.torque_nm, key=abs)
     return {
         "difference_rad": after.angle_at(torque) - before.angle_at(torque),
         "sd_rad": float(np.sqrt(before.variance(noise) + after.variance(noise))),
         "torque_Nm": torque,
         "cycle": after.cycle,
-        "basis": "settled loop" if before.cycle > 0 else first,
+        "basis": "settled loop" if settled else f"{before.label} of the first loading and of the loop",
     }
 
 

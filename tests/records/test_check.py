@@ -61,6 +61,60 @@ def test_drifting_loop_does_not_close():
     assert record["closure"]["difference_rad"] == pytest.approx(20 * ARCMIN * 4 / time[-1], rel=0.1)
 
 
+@pytest.mark.parametrize("cycles", [49, 50, 100])
+def test_many_cycles_are_not_lost_in_noise(cycles):
+    """Means over whole cycles are alike."""
+    time, torque = ramps((0, *(1, -1) * cycles, 0), hertz=100.0, noise=0.002)
+    result, record = judged(time, torque)
+    assert result["may_infer"] and not texts(result, "warning")
+    assert record["angle_signal_rad"] > 0.8 * (record["angle_range_rad"])
+
+
+def test_an_encoder_that_slips_once_leaves_a_loop_open():
+    """The last cycle closes; the one with the slip does not."""
+    time, torque = ramps((0, 1, -1, 1, -1, 1, -1, 1), noise=0.002)
+    angle = answer(torque) + 20 * ARCMIN * (time > 0.45 * time[-1])
+    result, record = judged(time, torque, angle)
+    assert "its encoder slips" in texts(result, "warning")
+    assert record["closure"]["difference_rad"] == pytest.approx(20 * ARCMIN, rel=0.02)
+    assert "not close" not in texts(judged(time, torque, answer(torque))[0], "warning")
+
+
+
+def test_what_is_declared_of_a_sine_is_its_mean_rate():
+    time = np.arange(0.0, 20.0, 0.005)
+    torque = np.sin(np.pi * time / 5.0) + 0.002 * np.random.default_rng(0).normal(size=time.size)
+    for declared, told in ((0.4, False), (0.2 * np.pi, True)):
+        result, _ = judged(time, torque, loading_rate_nm_per_s=declared)
+        assert ("declared loading rate" in texts(result, "warning")) == told
+
+
+def test_the_largest_cycles_are_those_of_the_amplitude():
+    """Smaller ones before, to run the reducer in, are none of it."""
+    time, torque = ramps((0, 0.85, -0.85, 0.85, -0.85, 1, -1, 1), noise=0.002)
+    result, record = judged(time, torque, amplitude_nm=1.0)
+    assert record["amplitude_Nm"]["estimated"] == pytest.approx(1.0, abs=0.01) and not texts(result, "warning")
+
+
+@pytest.mark.parametrize("hertz", [4.0, 5.0, 7.3])
+def test_the_tips_of_a_coarse_record_are_no_spikes(hertz):
+    time, torque = ramps((0, 1, -1, 1, -1, 1), hertz=hertz, rate=0.2)
+    torque = torque + 3e-4 * np.random.default_rng(0).normal(size=time.size)
+    assert "isolated" not in texts(judged(time, torque)[0], "error") + texts(judged(time, torque)[0], "warning")
+    torque[40] += 1.5
+    assert "1 isolated torque sample" in " ".join(texts(judged(time, torque)[0], level) for level in ("error", "warning"))
+
+
+def test_a_torque_that_is_noise_while_the_angle_goes_on_is_not_read():
+    """A cable that came off: the channel's noise goes on, so that nothing stands still."""
+    time, torque = ramps((0, 1, -1, 1, -1, 1))
+    angle, noise = answer(torque), 0.002 * np.random.default_rng(0).normal(size=time.size)
+    assert judged(time, torque + noise, angle)[0]["may_infer"]
+    torque[time.size // 2 :] = 0.0
+    result, _ = judged(time, torque + noise, angle)
+    assert "it is not read, though its noise may go on" in texts(result, "error") and not result["may_infer"]
+
+
 def test_plateau_is_seen():
     result, record = judged(*ramps((0, 2, -2, 2), limit=1.0, noise=0.002))
     assert len(record["plateaus"]) == 2

@@ -206,6 +206,15 @@ def test_tdms_of_two_groups_with_a_clock_each(tmp_path):
     assert record.torque_nm[slow] == pytest.approx(answer(TORQUE[slow]), abs=1e-9)
 
 
+@pytest.mark.parametrize("groups", ["aa", "ab"])
+def test_tdms_with_a_clock_of_date_and_time(tmp_path, groups):
+    """In one group or two; the planted fault was to take the only one for a column of numbers without a unit."""
+    stamps = np.datetime64("2024-05-03T10:00:00", "us") + (1e6 * (TIME - TIME[0])).round().astype("timedelta64[us]")
+    torque, angle = ("a", "M [mNm]", 1e3 * TORQUE), (groups[1], "phi [deg]", DEG)
+    path = tdms(tmp_path / "r.tdms", *((g, "Time", stamps) for g in sorted(set(groups))), torque, angle)
+    reads_true(path, "groups' own channels")
+
+
 def test_tdms_of_two_groups_on_one_clock(tmp_path):
     channels = [("a", "time_s", TIME), ("a", "torque_mNm", 1e3 * TORQUE), ("b", "time_s", TIME), ("b", "angle_deg", DEG)]
     reads_true(tdms(tmp_path / "r.tdms", *channels), "groups' own channels")

@@ -49,6 +49,7 @@ def test_every_unit_reads_as_suffix_and_in_brackets(kind):
         ("torque", "torque", "'torque'"),
         ("M [nm]", "torque", "did you mean Nm?"),
         ("phi [arcmins]", "angle", "did you mean arcmin?"),
+        ("Winkel [Grad]", "angle", "did you mean deg?"),
         ("phi [Nm]", "angle", "rad"),
         ("M []", "torque", "M []"),
     ],

@@ -42,7 +42,7 @@ def read(path: Path, choose: Choose) -> Columns:
 def _read_channels(path: Path, channels: dict, file, choose: Choose) -> Columns:
     clocks = {group.name: _clock_of(group) for group in file.groups()}
     times = [name for name in channels if _is_time(name)]
-    own_clock = len(times) != 1
+    own_clock = len(times) != 1 or channels[times[0]].dtype.kind == "M"
     headers = tuple(name for name in channels if not (own_clock and name in times))
     if own_clock and any(clock is not None for clock in clocks.values()):
         headers = (TIME_HEADER, *headers)
