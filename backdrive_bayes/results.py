@@ -75,6 +75,8 @@ def _read(path, names):
     import h5py
 
     loaded, name = {}, names[0]
+    if not path.is_file():
+        raise BadInput(path, "the posterior.nc of a fit", "a folder" if path.is_dir() else "nothing there")
     try:
         with h5py.File(path) as file:
             for name in names:

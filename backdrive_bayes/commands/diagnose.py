@@ -82,7 +82,7 @@ def _summarise(result: dict, sampled, out: Path) -> None:
         show_simulator(simulator, result["level"])
     elif not result["inconclusive"]:
         closed = result["shrink"]["closed_fraction"]
-        if closed is not None:
+        if closed is not None and set(result["answer"]["effects"]) - {"unknown"}:
             say(f"share of the gap closed on held-out data: {share_text(closed)} (90 % interval)")
     if sampled is not None:
         show_indicators(sampled[1])

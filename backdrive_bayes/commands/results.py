@@ -244,7 +244,7 @@ def refuse_company(out: Path, result: dict) -> None:
 
     path = out / "indicators.json"
     if path.is_file():
-        require_same_data(path, read_result(path, INDICATORS), result)
+        require_same_data(out, result, read_result(path, INDICATORS))
 
 
 def draw_figures(file: str, folder: Path) -> None:

@@ -78,7 +78,7 @@ def _finish(found: Found, progress) -> Diagnosis:
             "rms_rad": found.gap.rms_rad,
             "noise_floor_rad": found.gap.noise_rad,
         },
-        "where": _where(found),
+        "where": _where(found, effects),
         "which": _which(found, answers, effects, posterior),
         "answer": {"effects": [] if inconclusive else list(effects), "credible_set_90": probabilities.credible_set(answers)},
         "shrink": _shrink(found, none, posterior),
@@ -98,10 +98,10 @@ def _records(found: Found):
     ]
 
 
-def _where(found: Found):
+def _where(found: Found, effects):
     cells = where.gap_map(found.linear, found.gap)
     amplitudes = {row["file"]: row["amplitude_Nm"] for row in _records(found)}
-    return {"summary": where.summary(cells, amplitudes, found.shown_left_out), "map": cells}
+    return {"summary": where.summary(cells, amplitudes, found.shown_left_out, bool(effects)), "map": cells}
 
 
 def _which(found: Found, answers, effects, posterior):
@@ -110,8 +110,8 @@ def _which(found: Found, answers, effects, posterior):
     rows = []
     for label, p in sorted((listed | {"unknown": 0.0, "none": 0.0} | answers).items(), key=lambda item: -item[1]):
         told: dict[str, dict] = {}
-        for name in label.split("+"):
-            if name in effects:
+        if set(label.split("+")) == set(effects):  # of other hypotheses nothing was sampled
+            for name in effects:
                 told |= effect_parameters(found.weighed, found.properties, posterior, name, LEVEL)
         rows.append({"effect": label, "probability": float(p)} | ({"parameters": told} if told else {}))
     return rows

@@ -3,31 +3,36 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from backdrive_bayes.engine.design import effect_columns
 from backdrive_bayes.gap.shrink import Fitted
 from backdrive_bayes.mechanics.effect import GrowthEffect, TangentEffect
 from backdrive_bayes.mechanics.history import History, through
+from backdrive_bayes.mechanics.registry import all_effects
 from backdrive_bayes.number_text import plain
 
 POINTS = 80
 NODES = np.polynomial.hermite_e.hermegauss(41)
 TIE = 0.02
 """Entropy [bits] within which proposals are equally good."""
-AT_ODDS = 0.1
-"""Noise of a prediction beside the measurement's: no formula is exact."""
+BY_CHANCE = 1.0
+"""Log odds that records which tell much may still leave, for what they tell scatters by about as much as it is."""
+AGAIN = "repeat the same record"
 
 
 def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> dict:
     """The contract's ``next_test`` for the two hypotheses that are still most probable."""
-    drops, linear = {}, pair[0].linear
+    linear, apart = pair[0].linear, {}
+    noise = linear.reduced.context.angle_noise
     for text, (history, rate) in _tests(linear).items():
-        # Before the first tip the past decides, and no test separates what nobody knows.
-        curves = [_predict(f, history, rate)[POINTS:] for f in pair]
-        apart = curves[0] - curves[1]
-        apart = apart - apart.mean()
-        noise = linear.reduced.context.angle_noise
-        drops[text] = _drop(float(apart @ apart) / (noise**2 + AT_ODDS * float(np.var(apart))) / 4.0, probability)
+        # Before the first tip the past decides, and no test separates what nobody knows; nor does anybody know the zero.
+        one, other = (_predict(fitted, history, rate)[:, POINTS:] for fitted in pair)
+        apart[text] = _apart(one - one.mean(axis=1, keepdims=True), other - other.mean(axis=1, keepdims=True), noise)
+    # One more of the records that were measured tells no more than these did: no formula is exact, noise is correlated.
+    known = 2.0 * max(abs(float(np.log(probability[0] / probability[1]))), BY_CHANCE) / len(linear.angles)
+    share = min(1.0, known / max(apart[AGAIN], 1e-300))
+    drops = {text: _drop(share * separation, probability) for text, separation in apart.items()}
     best = max(drops.values())
     ties = [text for text, drop in drops.items() if drop > best - TIE]
     names = ["+".join(f.effects) or "none" for f in pair]
@@ -41,7 +46,7 @@ def _tests(linear):
     return {
         f"repeat the loop at {plain(slow * scale)} N·m/s": (_path(loop, slow), slow),
         f"repeat the loop at {plain(fast * scale)} N·m/s": (_path(loop, fast), fast),
-        "repeat the same record": (_path(loop, usual), usual),
+        AGAIN: (_path(loop, usual), usual),
         f"measure the loop at half the amplitude, ±{plain(0.5 * scale)} N·m": (_path(0.5 * loop, usual), usual),
         "load in the negative direction first": (_path(-loop, usual), usual),
         "dwell for 30 s at each tip": (_path(loop, usual, 30.0), usual),
@@ -58,31 +63,58 @@ def _path(turning, rate, dwell_s=0.0) -> History:
 
 
 def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
-    """Angle at the segments' ends that a hypothesis expects, in shares of the angle scale."""
+    """Angles at the segments' ends in shares of the angle scale, (1 + directions, segments): what a hypothesis expects, and a
+    standard deviation away from it in independent directions of its weights, those that the records do not tell among them."""
     linear = fitted.linear
-    weights, context = linear.design.split(fitted.mean), linear.reduced.context
+    away = np.c_[fitted.mean, fitted.mean[:, None] + fitted.root]
+    weights, scale, context = linear.design.split(away), linear.design.split(fitted.scale), linear.reduced.context
+    own, untold = {g.name for g in linear.design.groups if g.own}, list[np.ndarray]()
     log_rate = np.log(rate) - np.log(context.rate).mean() + history.surge
     growth = linear.distortion.growth(log_rate, history.log_amplitude, context)
+    law = linear.distortion.law(log_rate, history.log_amplitude, context)
     base = linear.reducer.ends(history, growth)
-    mean = {n: weights[n] for n in base}
-    turned = angle = sum(base[n] @ mean[n] for n in base)
+    mean = {n: weights[n][:, 0] for n in base}
+    angle = sum(base[n] @ weights[n] for n in base).T
+    turned = angle[0].copy()
     step, direction = np.abs(history.z1 - history.z0), np.sign(history.z1 - history.z0)
-    slope = np.where(step > 1e-9, np.diff(angle, prepend=angle[0]) / np.maximum(step, 1e-9), 0.0)
+    slope = np.where(step > 1e-9, np.diff(turned, prepend=turned[0]) / np.maximum(step, 1e-9), 0.0)
     for effect in linear.effects:
         weight = weights.get(effect.name)
         if weight is None:
             continue
         columns = effect_columns(effect, linear.reducer, history, mean, growth, turned, context, ends=True)
-        if columns is not None:
-            angle = angle + columns @ weight[: columns.shape[1]]
+        if columns is not None and effect.name in own:
+            # Each record has weights of its own: of another one nothing is known but how large they may be.
+            untold.append((columns * scale[effect.name][: columns.shape[1]]).T)
+        elif columns is not None:
+            angle = angle + (columns @ weight).T
         elif isinstance(effect, GrowthEffect):
-            term = linear.distortion.law(log_rate, history.log_amplitude, context)[effect.term]
-            away = weight[:1] - getattr(linear.distortion, effect.parameter)
-            angle = angle + linear.reducer.shifted(history, mean, growth, effect.part, away, term)[0]
+            further = weight[0] - getattr(linear.distortion, effect.parameter)
+            angle = angle + linear.reducer.shifted(history, mean, growth, effect.part, further, law[effect.term])
         elif isinstance(effect, TangentEffect):
             # The path itself is free of offset and lag: their whole size counts.
-            angle = angle + float(weight[0]) * {"offset": direction * slope, "lag_s": -rate * slope}[effect.parameter]
-    return angle
+            angle = angle + weight[0][:, None] * {"offset": direction * slope, "lag_s": -rate * slope}[effect.parameter]
+    terms = (e for name in fitted.effects for e in all_effects().get(name, ()) if isinstance(e, GrowthEffect))
+    unlearnt = ((e, np.array([e.present(context)])) for e in terms if e.name not in weights)
+    untold += [linear.reducer.shifted(history, mean, growth, e.part, sd, law[e.term]) for e, sd in unlearnt]
+    return np.concatenate([angle, *(angle[:1] + away for away in untold)])
+
+
+def _apart(one, other, noise) -> float:
+    """Twice the information by which two predictions as from ``_predict`` are told apart, in nats, whichever of them holds: the
+    smaller one. Of two that scatter alike it is the square of their distance in standard deviations."""
+    (a, b), spread = (curves[0] for curves in (one, other)), [curves[1:] - curves[0] for curves in (one, other)]
+    first, second = (noise**2 * np.eye(a.size) + away.T @ away for away in spread)
+    away = a - b
+
+    def information(held, doubted):
+        """Kullback-Leibler divergence."""
+        factor = cho_factor(doubted)
+        sizes = (2.0 * np.sum(np.log(np.diag(cho_factor(c)[0]))) for c in (doubted, held))
+        volume = next(sizes) - next(sizes)
+        return 0.5 * float(np.trace(cho_solve(factor, held)) - a.size + volume + away @ cho_solve(factor, away))
+
+    return 2.0 * max(min(information(first, second), information(second, first)), 0.0)
 
 
 def _drop(separation, probability):

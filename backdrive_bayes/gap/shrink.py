@@ -27,12 +27,14 @@ SMALLEST_GAP = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A hypothesis ready for prediction: the linear model about its mode, scales and means of its weights, (weights,)."""
+    """A hypothesis ready for prediction: the linear model about its mode, scales and means of its weights, (weights,), and a root
+    of their covariance, (weights, weights)."""
 
     effects: tuple[str, ...]
     linear: Linear
     scale: np.ndarray
     mean: np.ndarray
+    root: np.ndarray
 
     @property
     def residual(self) -> list[np.ndarray]:
@@ -44,7 +46,8 @@ class Fitted:
 def fit_hypothesis(linear: Linear, effects, priors) -> Fitted:
     """Scales and weights of a hypothesis on all records."""
     scales, log_scale, solution = learn_scales(linear, priors)
-    return Fitted(tuple(effects), linear, scales.of_weights(log_scale), solution.mean)
+    root = solution.root * np.sqrt(solution.variance)
+    return Fitted(tuple(effects), linear, scales.of_weights(log_scale), solution.mean, root)
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,7 +72,7 @@ class Split:
         tuned = shrink(*self.fits, self.linear.reduced.spans_nm, rng)
         group = min(self.linear.design.groups, key=lambda g: g.width)
         alone = replace(self.linear, angles=tuple(self.gap), design=Design((group,)))
-        nothing = Fitted((), alone, np.zeros(group.width), np.zeros(group.width))
+        nothing = Fitted((), alone, np.zeros(group.width), np.zeros(group.width), np.zeros((group.width, group.width)))
         bare = shrink(nothing, nothing, self.linear.reduced.spans_nm, rng).before
         after = {"simulated": bare, "retuned": tuned.before, "explained": tuned.after}
         return {stage: replace(tuned, before=bare, after=values) for stage, values in after.items()}

@@ -100,11 +100,13 @@ def _cell(name, key, own, gap, r, total, amplitude):
     }  # fmt: skip
 
 
-def summary(cells: list[dict], amplitudes: dict[str, float], left_out: str = "") -> str:
+def summary(cells: list[dict], amplitudes: dict[str, float], left_out: str = "", named: bool = False) -> str:
     """One plain sentence about a map; ``amplitudes`` are those of the records by name [N·m], ``left_out`` a part of the data in
-    which the gap stands out once it is left out of the fit."""
+    which the gap stands out once it is left out of the fit, ``named`` says whether something is named all the same."""
     if not any(c["credible"] for c in cells):
         text = "Nowhere does the gap stand out from the noise"
+        if named and not left_out:
+            text += ": the class, which is fitted to all records, takes up what the evidence is for"
         if left_out:
             text += f" while the model may bend to all records; it does in {left_out}, as predicted from the others"
         return text + "."

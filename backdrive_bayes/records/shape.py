@@ -34,8 +34,8 @@ def _near_end(segment: Segment) -> int:
 
 
 def _reached(time_s: np.ndarray, torque_nm: np.ndarray, beyond: float = 0.5) -> float:
-    """Torque in N·m that a leg reaches, from its last part: a straight ramp up to its end, ``beyond`` steps after the last sample, or
-    one that then comes to rest.
+    """Torque in N·m that a leg reaches, from its last part: a straight ramp to its end, ``beyond`` steps after the last sample,
+    or one that then comes to rest.
 
     A rest is believed where the squares left fall by more than two parameters are worth (Schwarz's criterion).
     """
