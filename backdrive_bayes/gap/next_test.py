@@ -21,8 +21,8 @@ BY_CHANCE = 1.0
 AGAIN = "repeat the same record"
 
 
-def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> dict:
-    """The contract's ``next_test`` for the two hypotheses that are still most probable."""
+def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> dict | None:
+    """The contract's ``next_test`` for the two hypotheses that are still most probable; None where none would tell."""
     linear, apart = pair[0].linear, {}
     noise = linear.reduced.context.angle_noise
     for text, (history, rate) in _tests(linear).items():
@@ -34,6 +34,8 @@ def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> di
     share = min(1.0, known / max(apart[AGAIN], 1e-300))
     drops = {text: _drop(share * separation, probability) for text, separation in apart.items()}
     best = max(drops.values())
+    if best < TIE:  # as good as none
+        return None
     ties = [text for text, drop in drops.items() if drop > best - TIE]
     names = ["+".join(f.effects) or "none" for f in pair]
     return {"do": " or: ".join(ties[:3]), "separates": names, "expected_entropy_drop_bits": best, "others": drops}

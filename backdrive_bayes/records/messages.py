@@ -50,10 +50,10 @@ def _channels(found, _):
             yield Finding("error", "coarse" if coarse else "frozen", coarse or text)
         elif held(frozen):
             yield Finding("warning", "held", f"{text}: its noise forbids that; it is held, not read, or clipped")
-    if found["unread_torque"]:
-        place = "from sample {} for {} samples".format(found["unread_torque"]["start"] + 1, found["unread_torque"]["samples"])
-        text = f"torque stays near {found['unread_torque']['torque_Nm']:.4g} N·m {place} while angle goes far there and back"
-        yield Finding("error", "unread_torque", f"{text}: it is not read, though its noise may go on")
+    if unread := found["unread_torque"]:
+        place = f"near {unread['torque_Nm']:.4g} N·m for {unread['samples']} samples from sample {unread['start'] + 1}"
+        text = f"torque stays {place} while angle goes far there and back: it is not read, though its noise may go on"
+        yield Finding("error", "unread_torque", text)
     if (found["angle_quantum_rad"] or 0.0) > found["noise"]["white_rad"]:
         yield Finding("note", "quantised", f"angle comes in steps of {_arcmin(found['angle_quantum_rad']):.3g}′")
 

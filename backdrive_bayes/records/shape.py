@@ -122,7 +122,8 @@ def closure(time_s, torque_nm, angle_rad, branches: tuple[Branch, ...], noise) -
     its tip.
     """
     tips = _tips(time_s, torque_nm, angle_rad, branches)
-    pairs = [(a, b) for b in reversed(tips) for a in tips if b.key == (a.label, a.cycle + 1)]
+    before = {(tip.label, tip.cycle + 1): tip for tip in tips}
+    pairs = [(before[tip.key], tip) for tip in reversed(tips) if tip.key in before]
     settled = [pair for pair in pairs if pair[0] is not tips[0]]
     if not pairs:
         return None

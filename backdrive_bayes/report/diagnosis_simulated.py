@@ -70,6 +70,7 @@ def _parameters(saved):
     columns = ["Parameter", "Unit", "Simulator", f"Measured [{level_text(saved.level)} interval]", ""]
     note = Note(
         "Functionals of the fitted reducer, the same for both: what the simulator's own parameters should amount to. "
-        "Changed: the interval of the change excludes zero."
+        "Changed: the interval of the change excludes zero. Compliances and friction are those of a reducer that has crept to "
+        "its end: where creep is what the simulator lacks, they hold it, and it is not to be added to them once more."
     )
     return [Table(columns, rows, [1.5, 0.9, 0.9, 1.5, 0.7]), note]

@@ -275,6 +275,7 @@ def test_the_measurement_that_is_proposed_tells_more_than_another_of_those_that_
     assert proposed["do"].endswith(best)
     assert proposed["others"][next_test.AGAIN] < 0.5 * proposed["expected_entropy_drop_bits"] < 0.4
     assert proposed["expected_entropy_drop_bits"] == max(proposed["others"].values())
+    assert next_test.propose(pair[:1] * 2, (0.6, 0.4)) is None, "of what predicts the same nothing is told"
 
 
 def test_what_is_told_apart_is_that_of_equal_scatter_and_the_lesser_of_unequal_one():
