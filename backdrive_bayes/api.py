@@ -186,7 +186,7 @@ def fit(unit, *, k=0.03, level=0.9, seed: int = 0, baseline=None, loads=(), load
     ``loads`` [N·m], arriving at ``load_rate`` [N·m/s] or at every measured rate, are answered under ``indicators["loads"]``.
     BadInput where the check finds the data unfit, unless ``force``, which the result says.
     """
-    modules = FitOptions.baseline if baseline is None else tuple(baseline)
+    modules = FitOptions.baseline if baseline is None else baseline
     options = FitOptions(modules, k, level, seed, tuple(loads), load_rate)
     ready = _ready(unit, k, force)
     return _fitted(ready, *fit_unit(ready.unit, options, progress or (lambda text: None)))
@@ -198,7 +198,7 @@ def diagnose(unit, *, simulated=None, k=0.03, level=0.9, seed: int = 0, baseline
     ``simulated`` is a unit (or the path of one) of what a simulator answered to the same or other torque paths; the diagnosis
     then says what the simulator lacks, and ``result["simulator"]`` what re-tuning it would close.
     """
-    modules = FitOptions.baseline if baseline is None else tuple(baseline)
+    modules = FitOptions.baseline if baseline is None else baseline
     options, ready = FitOptions(modules, k, level, seed), _ready(unit, k, force)
     other = None if simulated is None else _ready(simulated, k, force)
     result, sampled = diagnose_unit(ready.unit, options, progress or (lambda text: None), simulated=other and other.unit)

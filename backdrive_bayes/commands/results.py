@@ -8,7 +8,7 @@ import os
 import platform
 import time
 from dataclasses import dataclass
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 
 from backdrive_bayes.commands.door import add_force_argument, ready_unit
@@ -42,6 +42,11 @@ class FitOptions:
 
     def __post_init__(self):
         known = BASELINE.split(",")
+        listed = self.baseline.split(",") if isinstance(self.baseline, str) else self.baseline
+        object.__setattr__(self, "baseline", tuple(listed))
+        for name in ("k", "level"):
+            if isinstance(value := getattr(self, name), bool) or not isinstance(value, Real):
+                raise BadInput(f"--{name}", "a number", repr(value))
         if not set(self.baseline) <= set(known) or "elastic" not in self.baseline:
             raise BadInput("--baseline", f"modules out of {', '.join(known)}, elastic among them", ",".join(self.baseline))
         if isinstance(self.seed, bool) or not isinstance(self.seed, Integral) or not 0 <= self.seed < 10**18:
@@ -63,8 +68,7 @@ class FitOptions:
     def of(cls, args) -> FitOptions:
         """From a parsed command line."""
         loads = tuple(getattr(args, "load", ()))
-        baseline = tuple(args.baseline.split(","))
-        return cls(baseline, args.k, args.level, args.seed, loads, getattr(args, "load_rate", None))
+        return cls(args.baseline, args.k, args.level, args.seed, loads, getattr(args, "load_rate", None))
 
     def to_json(self) -> dict:
         """As results carry them; the seed stands beside them."""

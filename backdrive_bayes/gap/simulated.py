@@ -74,7 +74,7 @@ def compared(found: Diagnosis, simulator: Simulator, seed: int, k: float) -> Dia
         "where": maps.pop("whole"),
         "which": _which(answers, found.json["which"]),
         "answer": lacks,
-        "shrink": _shrink(split, found, k),
+        "shrink": _shrink(split, found, k, told),
         "residual": _residual(split, found.json["residual"]),
         "simulator": {
             "unit": simulator.unit.name,
@@ -172,8 +172,9 @@ def _which(answers, rows):
     return found
 
 
-def _shrink(split, found, k):
-    """How far the gap shrinks on held-out data from the simulator as it is to the re-tuned one with what it lacks."""
+def _shrink(split, found, k, told):
+    """How far the gap shrinks on held-out data from the simulator as it is to the re-tuned one with what it lacks; of a gap that
+    cannot be ``told`` there is no share."""
 
     def rms(fold=None):
         stages = zip(("before", "retuned", "after"), STAGES, strict=True)
@@ -188,9 +189,9 @@ def _shrink(split, found, k):
             values = IndicatorDraws(posterior, k).values(name, *loop)
             change.setdefault(name, {})[key] = central(values, LEVEL) if np.isfinite(values).all() else None
     return found.json["shrink"] | rms() | {
-        "closed_fraction": split.shares(LEVEL)["both"],
+        "closed_fraction": split.shares(LEVEL)["both"] if told else None,
         "records": [
-            {"record": name, **rms(fold), "closed_fraction": split.shares(LEVEL, fold)["both"]}
+            {"record": name, **rms(fold), "closed_fraction": split.shares(LEVEL, fold)["both"] if told else None}
             for fold, name in enumerate(whole.names)
         ],
         "gaussian_process": {"closed_fraction": whole.closed("control", rng, LEVEL)},

@@ -180,6 +180,13 @@ def test_the_python_interface_refuses_what_the_verb_does(fits):
     assert not (fits / "none").exists()
 
 
+def test_modules_are_given_as_a_list_or_as_the_verb_takes_them_and_shares_are_numbers():
+    assert FitOptions("elastic,friction").baseline == FitOptions(["elastic", "friction"]).baseline == ("elastic", "friction")
+    for wrong in ({"k": "x"}, {"level": None}, {"k": True}, {"baseline": "foo"}):
+        with pytest.raises(BadInput, match="expected"):
+            FitOptions(**wrong)
+
+
 def test_nothing_is_decided_on_forced_data(tmp_path, capsys):
     """Whatever its intervals say; without force the same fit is accepted (planted fault: it was with force, too)."""
     for forced in (False, True):

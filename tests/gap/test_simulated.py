@@ -105,6 +105,7 @@ def test_a_simulator_that_has_the_effect_and_agrees_lacks_nothing(against):
     split = found["simulator"]
     assert split["effects"] == split["shared_effects"] == ["torque_offset"] and found["answer"]["effects"] == []
     assert not split["told"] and split["closed_by_retuning"]["median"] is None
+    assert found["shrink"]["closed_fraction"] is None and not any(r["closed_fraction"] for r in found["shrink"]["records"])
     assert "agree within the noise" in split["summary"] and split["rms_rad"]["simulated"] < 1.2 * split["rms_rad"]["noise_floor"]
 
 
