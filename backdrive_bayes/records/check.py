@@ -27,7 +27,7 @@ from backdrive_bayes.records.noise import ChannelRecord, estimate_noise
 from backdrive_bayes.records.plausible import why_unfinished
 from backdrive_bayes.records.record import Record, Unit
 from backdrive_bayes.records.shape import closure, cycle_count, extremes, mean_rate
-from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy, width_reversed
+from backdrive_bayes.records.signs import angle_jumps, angle_rise, gives_energy, torque_breaks, width_reversed
 from backdrive_bayes.results import CHECK
 
 LOST_MOTION_SHARE = 0.03
@@ -87,6 +87,7 @@ def check_record(record: Record, rated_torque_nm: float, k: float = LOST_MOTION_
         "gap_count": int(gaps_after(time).size),
         **channels,
         "unread_torque": unread_torque(torque, angle),
+        "torque_breaks": [int(k) + 1 for k in torque_breaks(time, torque, segments)],
         "plateaus": find_plateaus(time, torque, low, high),
         "angle_range_rad": float(np.ptp(angle)),
         "angle_signal_rad": max(_signal(angle), abs(rise["rise_rad"])),  # many cycles are alike in all blocks

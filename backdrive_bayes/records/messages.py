@@ -54,6 +54,10 @@ def _channels(found, _):
         place = f"near {unread['torque_Nm']:.4g} N·m for {unread['samples']} samples from sample {unread['start'] + 1}"
         text = f"torque stays {place} while angle goes far there and back: it is not read, though its noise may go on"
         yield Finding("error", "unread_torque", text)
+    if breaks := found["torque_breaks"]:
+        times = f"{len(breaks)} time{'s'[: len(breaks) != 1]}, first at sample {breaks[0]}"
+        text = f"torque jumps against its ramp {times}: drop-outs that last, a loose cable?"
+        yield Finding("warning", "torque_breaks", text)
     if (found["angle_quantum_rad"] or 0.0) > found["noise"]["white_rad"]:
         yield Finding("note", "quantised", f"angle comes in steps of {_arcmin(found['angle_quantum_rad']):.3g}′")
 

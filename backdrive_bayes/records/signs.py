@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 
-from backdrive_bayes.records.faults import find_wild
+from backdrive_bayes.records.faults import SPOILING_SHARE, find_wild, gaps_after
 from backdrive_bayes.records.measured_loop import MeasuredLoop
 from backdrive_bayes.records.wraps import find_jumps
 
 _LONG = 0.5  # of the longest ramp: shorter ones say little of the slope
 _END_SHARE = 0.1  # of a ramp's samples at either end
 _SURE_SD = 4.0
+_BREAK_STEPS = 20.0  # of the usual ones, of a torque that breaks off: the steps of a noisy one are a few
 _REVERSED = 0.2  # of half the angle between the tips: waves of an encoder and drifts stay below
 
 
@@ -46,6 +47,19 @@ def angle_jumps(angle_rad: np.ndarray, segments) -> dict:
         "first_sample": int(jumps[0]) + 2 if jumps.size else None,
         "largest_step_rad": float(np.abs(steps).max()),
     }
+
+
+def torque_breaks(time_s: np.ndarray, torque_nm: np.ndarray, segments) -> np.ndarray:
+    """Numbers of the samples before which the torque jumps against its ramp, far from the ramp's ends: a cable that was loose for
+    a while takes it away and gives it back, one of which is against any ramp."""
+    steps, inner = np.diff(torque_nm), np.zeros(len(torque_nm) - 1, bool)
+    direction = np.concatenate([np.full(s.stop - s.start, s.direction) for s in segments])[1:]
+    for segment in segments:
+        end = max(int(_END_SHARE * (segment.stop - segment.start)), 1)
+        inner[segment.start + end : segment.stop - end] = True
+    inner[gaps_after(time_s)] = False
+    far = max(SPOILING_SHARE * float(np.ptp(torque_nm)), _BREAK_STEPS * float(np.median(np.abs(steps))))
+    return 1 + np.flatnonzero(inner & (steps * direction < -far))
 
 
 def inverted(rise: dict, angle_range_rad: float) -> bool:

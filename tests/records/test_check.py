@@ -115,6 +115,18 @@ def test_a_torque_that_is_noise_while_the_angle_goes_on_is_not_read():
     assert "it is not read, though its noise may go on" in texts(result, "error") and not result["may_infer"]
 
 
+@pytest.mark.parametrize("stairs", [False, True])
+def test_a_torque_that_drops_out_for_a_while_is_a_loose_cable(stairs):
+    """Too long for a spike and too short to change the loop's ramps; the steps of stairs go with their ramp."""
+    time, torque = ramps((0, 1, -1, 1, -1, 1), hertz=2000.0)
+    torque = np.round(8 * torque) / 8 if stairs else torque
+    angle, noise = answer(torque), 0.002 * np.random.default_rng(0).normal(size=time.size)
+    assert "loose cable" not in texts(judged(time, torque + noise, angle)[0], "warning")
+    for begin in (3000, 9500):
+        torque[begin : begin + 50] = 0.0
+    assert "jumps against its ramp 2 times" in texts(judged(time, torque + noise, angle)[0], "warning")
+
+
 def test_plateau_is_seen():
     result, record = judged(*ramps((0, 2, -2, 2), limit=1.0, noise=0.002))
     assert len(record["plateaus"]) == 2
