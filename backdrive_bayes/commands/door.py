@@ -50,11 +50,10 @@ def judged(unit, k: float = 0.03, force: bool = False, where: object = "") -> Re
     """
     from backdrive_bayes.records.check import check_unit
     from backdrive_bayes.records.faults import without_wild
-    from backdrive_bayes.records.plausible import check_plausible, refuse_short
+    from backdrive_bayes.records.plausible import check_plausible
 
     if not where:  # made in memory: what a reader would refuse
         for record in unit.records:
-            refuse_short(record.time_s.size, record.name)
             check_plausible(record, unit.rated_torque_nm, record.name)
     checked = check_unit(unit, k)
     if not checked["may_infer"] and not force:

@@ -17,22 +17,22 @@ NODES = np.polynomial.hermite_e.hermegauss(41)
 TIE = 0.02
 """Entropy [bits] within which proposals are equally good."""
 BY_CHANCE = 1.0
-"""Log odds that records which tell much may still leave, for what they tell scatters by about as much as it is."""
+"""Log odds that informative records may still leave between two answers: evidence scatters by about as much as it is."""
 AGAIN = "repeat the same record"
 
 
 def propose(pair: tuple[Fitted, Fitted], probability: tuple[float, float]) -> dict | None:
     """The contract's ``next_test`` for the two hypotheses that are still most probable; None where none would tell."""
-    linear, apart = pair[0].linear, {}
+    linear, separations = pair[0].linear, {}
     noise = linear.reduced.context.angle_noise
     for text, (history, rate) in _tests(linear).items():
         # Before the first tip the past decides, and no test separates what nobody knows; nor does anybody know the zero.
         one, other = (_predict(fitted, history, rate)[:, POINTS:] for fitted in pair)
-        apart[text] = _apart(one - one.mean(axis=1, keepdims=True), other - other.mean(axis=1, keepdims=True), noise)
-    # One more of the records that were measured tells no more than these did: no formula is exact, noise is correlated.
+        separations[text] = _separation(one - one.mean(axis=1, keepdims=True), other - other.mean(axis=1, keepdims=True), noise)
+    # One more of the records that were measured separates no better than these did: no formula is exact, noise is correlated.
     known = 2.0 * max(abs(float(np.log(probability[0] / probability[1]))), BY_CHANCE) / len(linear.angles)
-    share = min(1.0, known / max(apart[AGAIN], 1e-300))
-    drops = {text: _drop(share * separation, probability) for text, separation in apart.items()}
+    share = min(1.0, known / max(separations[AGAIN], 1e-300))
+    drops = {text: _drop(share * separation, probability) for text, separation in separations.items()}
     best = max(drops.values())
     if best < TIE:  # as good as none
         return None
@@ -66,11 +66,11 @@ def _path(turning, rate, dwell_s=0.0) -> History:
 
 def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
     """Angles at the segments' ends in shares of the angle scale, (1 + directions, segments): what a hypothesis expects, and a
-    standard deviation away from it in independent directions of its weights, those that the records do not tell among them."""
+    standard deviation away from it in independent directions of its weights, those that the records leave open among them."""
     linear = fitted.linear
-    away = np.c_[fitted.mean, fitted.mean[:, None] + fitted.root]
-    weights, scale, context = linear.design.split(away), linear.design.split(fitted.scale), linear.reduced.context
-    own, untold = {g.name for g in linear.design.groups if g.own}, list[np.ndarray]()
+    directions = np.c_[fitted.mean, fitted.mean[:, None] + fitted.root]
+    weights, scale, context = linear.design.split(directions), linear.design.split(fitted.scale), linear.reduced.context
+    own, spread = {g.name for g in linear.design.groups if g.own}, list[np.ndarray]()
     log_rate = np.log(rate) - np.log(context.rate).mean() + history.surge
     growth = linear.distortion.growth(log_rate, history.log_amplitude, context)
     law = linear.distortion.law(log_rate, history.log_amplitude, context)
@@ -87,7 +87,7 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
         columns = effect_columns(effect, linear.reducer, history, mean, growth, turned, context, ends=True)
         if columns is not None and effect.name in own:
             # Each record has weights of its own: of another one nothing is known but how large they may be.
-            untold.append((columns * scale[effect.name][: columns.shape[1]]).T)
+            spread.append((columns * scale[effect.name][: columns.shape[1]]).T)
         elif columns is not None:
             angle = angle + (columns @ weight).T
         elif isinstance(effect, GrowthEffect):
@@ -98,25 +98,23 @@ def _predict(fitted: Fitted, history: History, rate: float) -> np.ndarray:
             angle = angle + weight[0][:, None] * {"offset": direction * slope, "lag_s": -rate * slope}[effect.parameter]
     terms = (e for name in fitted.effects for e in all_effects().get(name, ()) if isinstance(e, GrowthEffect))
     unlearnt = ((e, np.array([e.present(context)])) for e in terms if e.name not in weights)
-    untold += [linear.reducer.shifted(history, mean, growth, e.part, sd, law[e.term]) for e, sd in unlearnt]
-    return np.concatenate([angle, *(angle[:1] + away for away in untold)])
+    spread += [linear.reducer.shifted(history, mean, growth, e.part, sd, law[e.term]) for e, sd in unlearnt]
+    return np.concatenate([angle, *(angle[:1] + away for away in spread)])
 
 
-def _apart(one, other, noise) -> float:
-    """Twice the information by which two predictions as from ``_predict`` are told apart, in nats, whichever of them holds: the
-    smaller one. Of two that scatter alike it is the square of their distance in standard deviations."""
-    (a, b), spread = (curves[0] for curves in (one, other)), [curves[1:] - curves[0] for curves in (one, other)]
-    first, second = (noise**2 * np.eye(a.size) + away.T @ away for away in spread)
-    away = a - b
+def _separation(one, other, noise) -> float:
+    """Twice the Kullback-Leibler divergence of two Gaussian predictions as from ``_predict``, in nats: the smaller of the two, as
+    either may hold. Of two that scatter alike it is the square of their distance in standard deviations."""
+    away, scatter = one[0] - other[0], [curves[1:] - curves[0] for curves in (one, other)]
+    covariances = [noise**2 * np.eye(away.size) + s.T @ s for s in scatter]
+    factors = [cho_factor(c) for c in covariances]
+    volumes = [2.0 * float(np.sum(np.log(np.diag(factor)))) for factor, _ in factors]
 
-    def information(held, doubted):
-        """Kullback-Leibler divergence."""
-        factor = cho_factor(doubted)
-        sizes = (2.0 * np.sum(np.log(np.diag(cho_factor(c)[0]))) for c in (doubted, held))
-        volume = next(sizes) - next(sizes)
-        return 0.5 * float(np.trace(cho_solve(factor, held)) - a.size + volume + away @ cho_solve(factor, away))
+    def twice(true, model):
+        stretched = float(np.trace(cho_solve(factors[model], covariances[true])))
+        return stretched - away.size + volumes[model] - volumes[true] + float(away @ cho_solve(factors[model], away))
 
-    return 2.0 * max(min(information(first, second), information(second, first)), 0.0)
+    return max(min(twice(0, 1), twice(1, 0)), 0.0)
 
 
 def _drop(separation, probability):

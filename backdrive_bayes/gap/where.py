@@ -105,10 +105,10 @@ def summary(cells: list[dict], amplitudes: dict[str, float], left_out: str = "",
     which the gap stands out once it is left out of the fit, ``named`` says whether something is named all the same."""
     if not any(c["credible"] for c in cells):
         text = "Nowhere does the gap stand out from the noise"
-        if named and not left_out:
-            text += ": the class, which is fitted to all records, takes up what the evidence is for"
         if left_out:
             text += f" while the model may bend to all records; it does in {left_out}, as predicted from the others"
+        elif named:
+            text += ": the class, which is fitted to all records, takes up what the evidence is for"
         return text + "."
     share = _shares(cells)
     high = sum(c["share"] for c in cells if max(abs(c["torque_lo_Nm"]), abs(c["torque_hi_Nm"])) > 0.61 * amplitudes[c["record"]])

@@ -29,7 +29,8 @@ def refuse_short(samples: int, where: str) -> None:
 
 
 def check_plausible(record: Record, rated_torque_nm: float | None, where: str) -> None:
-    """Raise BadInput at ``where`` unless ``record`` holds channels that move, each in its place."""
+    """Raise BadInput at ``where`` unless ``record`` holds enough samples, of channels that move, each in its place."""
+    refuse_short(record.time_s.size, where)
     torque = record.torque_nm
     seconds = float(record.time_s[-1] - record.time_s[0])
     if not _SHORTEST_S < seconds < _LONGEST_S:

@@ -103,7 +103,7 @@ def suggestion(unit: str, kind: str) -> str:
     """A question whether a near unit was meant, empty where none is near."""
     near = [known for known in UNITS[kind] if known.casefold() == unit.casefold()]
     meant = _MEANT.get(unit.casefold())
-    near = near or [meant for known in UNITS[kind] if known == meant]
+    near = near or ([meant] if meant in UNITS[kind] else [])
     near = near or difflib.get_close_matches(unit, UNITS[kind], n=1)
     return f" (did you mean {near[0]}?)" if unit and near else ""
 

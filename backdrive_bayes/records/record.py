@@ -38,9 +38,10 @@ class Record:
 
     def __post_init__(self):
         for name in _CHANNELS:
-            object.__setattr__(self, name, _samples(getattr(self, name), f"record {self.name}, {name}"))
-            if getattr(self, name).size != self.time_s.size:
-                raise BadInput(f"record {self.name}, {name}", f"{self.time_s.size} samples", str(getattr(self, name).size))
+            values = _samples(getattr(self, name), f"record {self.name}, {name}")
+            object.__setattr__(self, name, values)
+            if values.size != self.time_s.size:
+                raise BadInput(f"record {self.name}, {name}", f"{self.time_s.size} samples", str(values.size))
         if np.any(back := np.diff(self.time_s) <= 0.0):
             at = int(np.argmax(back)) + 1
             where = f"record {self.name}, time_s[{at}]"
@@ -75,9 +76,10 @@ class Unit:
     file_sha256: str = ""
 
     def __post_init__(self):
-        ratio = () if self.reduction_ratio is None else ("reduction_ratio",)
-        for name in ("rated_torque_nm", *ratio):
+        for name in ("rated_torque_nm", "reduction_ratio"):
             value = getattr(self, name)
+            if name == "reduction_ratio" and value is None:
+                continue
             if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < value < math.inf:
                 raise BadInput(f"unit {self.name}, {name}", "a finite number above zero", repr(value)[:100])
         if not self.records:

@@ -39,7 +39,7 @@ def angle_jumps(angle_rad: np.ndarray, segments) -> dict:
     wild = find_wild(angle_rad)
     steps = np.where(wild[1:] | wild[:-1], 0.0, np.diff(angle_rad))
     jumps = find_jumps(angle_rad)
-    direction = np.concatenate([np.full(s.stop - s.start, s.direction) for s in segments])
+    direction = _directions(segments)
     return {
         "count": int(jumps.size),
         "against_motion": int(np.count_nonzero(np.sign(steps[jumps]) * direction[jumps] < 0)),
@@ -49,11 +49,16 @@ def angle_jumps(angle_rad: np.ndarray, segments) -> dict:
     }
 
 
+def _directions(segments) -> np.ndarray:
+    """Way of the ramp at every sample, 1 or -1, (samples,)."""
+    return np.concatenate([np.full(s.stop - s.start, s.direction) for s in segments])
+
+
 def torque_breaks(time_s: np.ndarray, torque_nm: np.ndarray, segments) -> np.ndarray:
     """Numbers of the samples before which the torque jumps against its ramp, far from the ramp's ends: a cable that was loose for
     a while takes it away and gives it back, one of which is against any ramp."""
     steps, inner = np.diff(torque_nm), np.zeros(len(torque_nm) - 1, bool)
-    direction = np.concatenate([np.full(s.stop - s.start, s.direction) for s in segments])[1:]
+    direction = _directions(segments)[1:]
     for segment in segments:
         end = max(int(_END_SHARE * (segment.stop - segment.start)), 1)
         inner[segment.start + end : segment.stop - end] = True

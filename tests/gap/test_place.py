@@ -278,11 +278,12 @@ def test_the_measurement_that_is_proposed_tells_more_than_another_of_those_that_
     assert next_test.propose(pair[:1] * 2, (0.6, 0.4)) is None, "of what predicts the same nothing is told"
 
 
-def test_what_is_told_apart_is_that_of_equal_scatter_and_the_lesser_of_unequal_one():
+def test_the_separation_is_that_of_equal_scatter_and_the_lesser_of_unequal_one():
     rng = np.random.default_rng(0)
     one = np.r_[np.zeros((1, 6)), 0.3 * rng.standard_normal((3, 6))]
     away = rng.standard_normal(6)
     spread = one[1:].T @ one[1:] + 0.04 * np.eye(6)
-    assert next_test._apart(one, one + away, 0.2) == pytest.approx(away @ np.linalg.solve(spread, away))
+    assert next_test._separation(one, one + away, 0.2) == pytest.approx(away @ np.linalg.solve(spread, away))
     wide = np.r_[one, 30.0 * np.eye(6)[:1]]
-    assert 2.0 < next_test._apart(one, wide, 0.2) < 12.0 and next_test._apart(one, one, 0.2) == pytest.approx(0.0, abs=1e-9)
+    assert 2.0 < next_test._separation(one, wide, 0.2) < 12.0
+    assert next_test._separation(one, one, 0.2) == pytest.approx(0.0, abs=1e-9)
